@@ -2,11 +2,13 @@
 #![allow(clippy::unwrap_used, reason = "a broken test may panic")]
 
 use crate::common;
-use crate::common::{csv, files, folder, run, shell};
+use crate::common::{csv, files, folder, run};
 use serde_json::Value;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::process::Stdio;
 use tempfile::TempDir;
+use twincal_io::statistics::StatisticsFile;
 
 /// A folder with four logs that differ by when they begin.
 fn logs() -> TempDir {
@@ -152,7 +154,7 @@ fn what_is_done_is_kept() {
     let line = "statistics run1.csv --model arm.urdf --config quick.toml -o st";
     run(at, line.split(' '))
         .expect(2)
-        .says(&["is there, of another plan, robot or log", "--force"]);
+        .says(&["is there, of another log", "--force"]);
     let plan = fs::read_to_string(at.join("st/plan.json")).unwrap();
     fs::write(
         at.join("old.json"),
@@ -163,7 +165,11 @@ fn what_is_done_is_kept() {
     run(at, line.split(' '))
         .expect(2)
         .says(&["the plan has version 0"]);
-    fs::write(at.join("other.json"), plan.replacen("0.0", "5.0", 1)).unwrap();
+    fs::write(
+        at.join("other.json"),
+        plan.replacen("_unknown\": false", "_unknown\": true", 1),
+    )
+    .unwrap();
     let line = "statistics run1.csv --model arm.urdf --plan other.json -o st";
     run(at, line.split(' '))
         .expect(2)
@@ -251,22 +257,75 @@ fn damaged_files_and_wrong_words_are_refused() {
     run(at, line.split(' '))
         .expect(2)
         .says(&["weigh rows one by one"]);
-    // A signal ends it, and nothing half-written stays.
-    let line = "\"$TWINCAL\" statistics run3.csv --model arm.urdf --config quick.toml -o sig & \
-                pid=$!; sleep 0.02; kill -9 $pid 2>/dev/null; wait $pid 2>/dev/null; \
-                \"$TWINCAL\" statistics run3.csv --model arm.urdf --config quick.toml -o sig";
-    shell(at, line).expect(0);
-    run(
-        at,
+}
+
+/// Files that are kept were read as they would be now; those of other settings, and damaged ones, are named with what helps.
+#[test]
+fn a_file_of_other_settings_or_damaged_is_not_kept() {
+    let folder = logs();
+    let at = folder.path();
+    made(at);
+    let factor = format!("{}[columns.factor]\ntau = 2\n", common::QUICK);
+    fs::write(at.join("factor.toml"), factor).unwrap();
+    let again = "statistics run0.csv --model arm.urdf -o st";
+    for other in ["--config factor.toml", "--config quick.toml --rate 10"] {
+        let line = format!("{again} {other}");
+        run(at, line.split(' ')).expect(2).says(&[
+            "run0.csv.arrow is there, of the log as other settings read it",
+            "--force",
+        ]);
+    }
+    run(at, format!("{again} --config quick.toml").split(' ')).expect(0);
+    let target = at.join("st/run0.csv.arrow");
+    let good = fs::read(&target).unwrap();
+    for bytes in [&good[..good.len() / 2], &good[..9], &[]] {
+        fs::write(&target, bytes).unwrap();
+        run(at, format!("{again} --config quick.toml").split(' '))
+            .expect(2)
+            .says(&["st/run0.csv.arrow: ", "twincal statistics"]);
+        let half = run(at, format!("{again} --config quick.toml").split(' '));
+        assert!(!half.err.contains("export it again"), "{}", half.err);
+    }
+    let line = format!("{again} --config quick.toml --force");
+    run(at, line.split(' ')).expect(0);
+    assert_eq!(fs::read(&target).unwrap(), good);
+}
+
+/// A run that is killed while it makes a file leaves whole files and its part; the next one goes on and nothing but files of its own stays.
+#[test]
+fn a_killed_run_goes_on() {
+    let folder = logs();
+    let at = folder.path();
+    made(at);
+    fs::write(at.join("long.csv"), csv(40_000, &|_, row| row)).unwrap();
+    let line = "statistics run0.csv long.csv --model arm.urdf --config quick.toml -o st";
+    let mut command = common::command(at);
+    command.args(line.split(' ')).stderr(Stdio::null());
+    let mut child = command.stdout(Stdio::null()).spawn().unwrap();
+    let is_part = |path: &PathBuf| path.extension().is_some_and(|ending| ending == "staging");
+    let mut seen = false;
+    while !seen && child.try_wait().unwrap().is_none() {
+        seen = files(&at.join("st")).iter().any(is_part);
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert!(seen, "it ended before it wrote");
+    let kept = files(&at.join("st"));
+    let whole = |path: &&PathBuf| path.to_string_lossy().ends_with(".arrow");
+    for path in kept.iter().filter(whole) {
+        let path = at.join("st").join(path);
+        StatisticsFile::read(&path).expect("a whole file");
+    }
+    run(at, line.split(' ')).expect(0);
+    assert_eq!(
+        files(&at.join("st")),
         [
-            "fit",
-            "--statistics",
-            "sig/run3.csv.arrow",
-            "--config",
-            "quick.toml",
-            "-o",
-            "sig-twin",
-        ],
-    )
-    .expect(3);
+            "long.csv.arrow",
+            "plan.json",
+            "run0.csv.arrow",
+            "run1.csv.arrow",
+            "run2.csv.arrow"
+        ]
+        .map(Path::new)
+    );
 }

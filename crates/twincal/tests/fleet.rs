@@ -209,7 +209,7 @@ fn bad_input_is_left_out_by_name_and_moves_nobody() {
     // Torque in another unit.
     let mut scaled = strange.clone();
     for joint in &mut scaled.joints {
-        joint.tau.iter_mut().flatten().for_each(|tau| *tau *= 1e6);
+        joint.tau.iter_mut().flatten().for_each(|tau| *tau *= 100.0);
     }
     let mut fleet = study.fleet(|_, _| false);
     fleet.add(&study.statistics("bad", &scaled));
@@ -239,7 +239,10 @@ fn bad_input_is_left_out_by_name_and_moves_nobody() {
     // Another robot, and another plan.
     let other = two_link::arm(1.5).expect("an arm");
     let mut fleet = study.fleet(|_, _| false);
-    let foreign = Statistics::of(("bad", &other), &study.plan, &Log::from(&strange), "");
+    let alike = [strange.clone()];
+    let of_other = plan_about(About::Found, &other, &alike[..], &study.settings, &|_| {});
+    let of_other = of_other.expect("a plan").0;
+    let foreign = Statistics::of(("bad", &other), &of_other, &Log::from(&strange), "");
     fleet.add(&foreign.expect("statistics"));
     let mut plan = study.plan.clone();
     plan.library.families.pop();

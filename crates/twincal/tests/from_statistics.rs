@@ -224,7 +224,14 @@ fn what_does_not_belong_together_is_refused() {
     );
     refused(
         with(&|other| other.robot = two_link::arm(2.1).expect("an arm")),
-        "or of another model file",
+        "of another model file than the others",
+    );
+    let mut exchanged = study.robot.description().clone();
+    exchanged.joints.swap(0, 1);
+    let exchanged = Robot::new(exchanged, &Default::default()).expect("an arm");
+    refused(
+        with(&|other| other.robot = exchanged.0.clone()),
+        "with joints `elbow`, `shoulder`, the others with `shoulder`, `elbow`, in this order",
     );
     let mut twice = sum.clone();
     refused(
@@ -268,7 +275,9 @@ fn what_is_wrong_with_a_log_stays_with_it() {
         "half of it",
         7,
     );
-    let wrong = wrong.expect("statistics").with_findings(vec![note.clone()]);
+    let wrong = wrong
+        .expect("statistics")
+        .with_reading(String::new(), vec![note.clone()]);
     let mut sum = study.merged(&plan, 0..2);
     sum.try_merge(&wrong).expect("the same plan");
     let none: &[Recording] = &[];
@@ -339,21 +348,148 @@ fn damaged_tables_and_odd_logs_are_refused() {
     }
     refused(twice.finish(), "log `log0` is there twice");
     assert_eq!(Quantity::of_name("power"), Some(Quantity::Power));
-    // A million times the torque of the others.
-    let mut loud = study.logs[3].clone();
-    for joint in &mut loud.joints {
-        joint.tau.iter_mut().flatten().for_each(|tau| *tau *= 1e6);
-    }
-    let loud = Statistics::of(("arm", &study.robot), &plan, &Log::from(&loud), "");
-    let mut all = study.merged(&plan, 0..3);
-    all.try_merge(&loud.expect("statistics"))
-        .expect("the same plan");
     let none: &[Recording] = &[];
-    let fit = calibrate_statistics(&all, none, &study.settings, &|_| {});
-    refused(fit.map_err(Error::from), "the torque of log `log3` is");
     // Rows are weighed one by one.
     let mut robust = study.settings.clone();
     robust.noise.robust = true;
     let fit = calibrate_statistics(&sum, none, &robust, &|_| {});
     refused(fit.map_err(Error::from), "weigh rows one by one");
+}
+
+/// A plan is of one robot; another model file has other columns and other joints.
+#[test]
+fn a_plan_is_of_one_robot() {
+    let study = study(1);
+    let plan = study.plan();
+    let log = Log::from(&study.logs[0]);
+    let heavier = two_link::arm(2.1).expect("an arm");
+    let own = Statistics::of(("arm", &heavier), &plan, &log, "");
+    refused(own, "made for another robot or model file than this one");
+}
+
+/// Whatever stands in a plan's file, it is read or refused: no filter is made of it that no memory holds, and nothing indexes beyond a list.
+#[test]
+fn odd_numbers_in_a_plan_are_refused() {
+    let study = study(1);
+    let plan = serde_json::to_value(study.plan()).expect("JSON");
+    let keys = [
+        "cutoff_hz",
+        "motion_cutoff_hz",
+        "rate_hz",
+        "motion_interval",
+        "coulomb_velocity",
+        "standstill_velocity",
+        "derived_from",
+        "velocity_from",
+        "corrections",
+        "history",
+    ];
+    let odd = ["0", "-1", "1e-9", "1e12", "[]"];
+    let used = |place: [&str; 2], value: &str| {
+        let mut plan = plan.clone();
+        plan[place[0]][place[1]] = serde_json::from_str(value).expect("JSON");
+        let Ok(plan) = serde_json::from_value::<Plan>(plan) else {
+            return false;
+        };
+        let log = Log::from(&study.logs[0]);
+        Statistics::of(("arm", &study.robot), &plan, &log, "").is_ok()
+    };
+    let mut taken = Vec::new();
+    for (key, value) in keys.iter().flat_map(|key| odd.map(|value| (*key, value))) {
+        if used(["pipeline", key], value) {
+            taken.push((key, value));
+        }
+    }
+    let harmless = [
+        ("motion_interval", "0"),
+        ("motion_interval", "1e-9"),
+        ("velocity_from", "[]"),
+        ("history", "[]"),
+    ];
+    assert_eq!(taken, harmless);
+    for key in [
+        "coulomb_velocity",
+        "ripple",
+        "linearised_at",
+        "payload_frame",
+    ] {
+        for value in odd {
+            assert!(!used(["library", key], value), "library.{key} = {value}");
+        }
+    }
+    let mut narrow = study.plan();
+    narrow.pipeline.cutoff_hz = 1e-9;
+    narrow.pipeline.motion_cutoff_hz = 4e-9;
+    let log = Log::from(&study.logs[0]);
+    let own = Statistics::of(("arm", &study.robot), &narrow, &log, "");
+    refused(own, "pipeline.cutoff_hz = 1e-9");
+}
+
+/// A log of another unit is refused by what the model says of it.
+#[test]
+fn torque_of_another_unit_is_refused_with_its_log() {
+    let study = study(1);
+    let plan = study.plan();
+    for (joints, words) in [
+        (0..2, "is 1000"),
+        (0..1, "the torque of joint `shoulder` is"),
+        (1..2, "the torque of joint `elbow` is"),
+    ] {
+        let mut loud = study.logs[0].clone();
+        for joint in &mut loud.joints[joints] {
+            joint.tau.iter_mut().flatten().for_each(|tau| *tau *= 1e6);
+        }
+        let own = Statistics::of(("arm", &study.robot), &plan, &Log::from(&loud), "");
+        refused(own, "log `log0`: the torque of");
+        let own = Statistics::of(("arm", &study.robot), &plan, &Log::from(&loud), "");
+        refused(own, words);
+    }
+}
+
+/// A held-out log that is a fitted one, cut and rounded, is named; one of the same hours is refused.
+#[test]
+fn a_held_out_copy_is_named() {
+    let study = study(3);
+    let plan = study.plan();
+    let sum = study.merged(&plan, 0..2);
+    let copies = |heldout: &Recording| -> Result<Vec<String>, Error> {
+        let heldout = std::slice::from_ref(heldout);
+        let fit = calibrate_statistics(&sum, heldout, &study.settings, &|_| {})?;
+        let copied = fit.findings.into_iter();
+        let copied = copied.filter(|finding| finding.code == Code::CopiedLog);
+        Ok(copied.map(|finding| finding.subject).collect())
+    };
+    assert_eq!(copies(&study.logs[2]).expect("a calibration"), [""; 0]);
+    let mut copy = study.logs[1].clone();
+    copy.name = "other".into();
+    copy.time.drain(..150);
+    for joint in &mut copy.joints {
+        joint.q.drain(..150);
+        for channel in [&mut joint.qd, &mut joint.qdd, &mut joint.tau] {
+            channel.as_mut().expect("all channels").drain(..150);
+        }
+        let tau = joint.tau.iter_mut().flatten();
+        tau.for_each(|tau| *tau = (*tau * 1000.0).round() / 1000.0);
+    }
+    assert_eq!(copies(&copy).expect("a calibration"), ["other"]);
+    let late = |log: &Recording, name: &str| {
+        let mut log = log.clone();
+        log.name = name.into();
+        log.time.iter_mut().for_each(|time| *time += 1.7e9);
+        log
+    };
+    let fitted = Statistics::of(
+        ("arm", &study.robot),
+        &plan,
+        &Log::from(&late(&study.logs[0], "log0")),
+        "",
+    );
+    let heldout = late(&study.logs[2], "log2");
+    let fit = calibrate_statistics(
+        &fitted.expect("statistics"),
+        std::slice::from_ref(&heldout),
+        &study.settings,
+        &|_| {},
+    );
+    refused(fit.map_err(Error::from), "overlap in time by");
 }

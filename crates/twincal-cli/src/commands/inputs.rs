@@ -78,7 +78,7 @@ impl RobotInput {
                 sha256: sha256(model.text.as_bytes()),
             },
             source: (stored, model.text.clone().into_bytes()),
-            findings: Vec::new(),
+            findings: model.findings.clone(),
         }
     }
 
@@ -89,6 +89,7 @@ impl RobotInput {
             stored_as: self.source.0.to_owned(),
             robot: self.name.clone(),
             text: String::from_utf8_lossy(&self.source.1).into_owned(),
+            findings: self.findings.clone(),
         }
     }
 }

@@ -347,8 +347,9 @@ pub fn statistics(
     let named = (model.input.name.as_str(), robot);
     let statistics = Statistics::of(named, plan, own, &file.sha256);
     let statistics = statistics.map_err(|error| Failure::from(read.as_given(error)))?;
+    let reading = settings.log.options(&log.given()).checksum();
     Ok(StatisticsFile {
-        statistics: statistics.with_findings(read.findings),
+        statistics: statistics.with_reading(reading, read.findings),
         model: model.input.model_file(),
     })
 }

@@ -17,6 +17,7 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use twincal::Finding;
 use twincal::calibrate::{About, CalibrationSettings, Plan, Statistics, plan_about};
+use twincal::robot::Robot;
 use twincal_io::artifact::{Inputs, OutputFile};
 use twincal_io::config::Settings;
 use twincal_io::memory;
@@ -157,16 +158,16 @@ impl Road<'_> {
         let given = about.is_none();
         let there = own.symlink_metadata().is_ok();
         let plan = match (given, there) {
-            (true, _) => read_plan(&self.flags.plan)?,
+            (true, _) => read_plan(&self.flags.plan, &self.robot.robot)?,
             (false, true) => {
                 self.progress
                     .step(&format!("using the plan {}", own.to_string_lossy()));
-                return read_plan(&own);
+                return read_plan(&own, &self.robot.robot);
             }
             (false, false) => self.new_plan(about.unwrap_or_default())?,
         };
         if given && there {
-            if read_plan(&own)? != plan {
+            if read_plan(&own, &self.robot.robot)? != plan {
                 return Err(Failure::usage(
                     format!("{} holds another plan", self.flags.output.to_string_lossy()),
                     "give another folder with -o: statistics of two plans do not add",
@@ -221,22 +222,8 @@ impl Road<'_> {
             made,
         };
         if !self.flags.force && target.symlink_metadata().is_ok() {
-            let known = StatisticsFile::read(&target)?.statistics;
-            let same = known.plan == *plan
-                && known.robot == self.robot.robot
-                && known.robot_name == self.robot_name
-                && known.log_names().eq([name])
-                && known.sources().eq([checksum_of_log(path)?.as_str()]);
-            if same {
-                return Ok(entry(false));
-            }
-            return Err(Failure::usage(
-                format!(
-                    "{} is there, of another plan, robot or log",
-                    target.to_string_lossy()
-                ),
-                "make it anew with --force, or give another folder with -o",
-            ));
+            self.require_kept(plan, &target, (path, name))?;
+            return Ok(entry(false));
         }
         let long = Long::of_pipeline(&plan.pipeline);
         let (robot, settings) = (&self.robot.robot, &self.settings.log);
@@ -254,16 +241,42 @@ impl Road<'_> {
         let statistics = Statistics::of(model, plan, log, &file.sha256);
         let statistics = statistics.map_err(|error| Failure::from(read.as_given(error)))?;
         let file = StatisticsFile {
-            statistics: statistics.with_findings(read.findings),
+            statistics: statistics.with_reading(self.reading(path), read.findings),
             model: self.robot.model_file(),
         };
         merge::write(output, |to| file.write_to(to))?;
         Ok(entry(true))
     }
+
+    /// Checksum of how a log is read.
+    fn reading(&self, path: &Path) -> String {
+        self.settings.log.options(path).checksum()
+    }
+
+    /// Refuses a file that another run made of another log, or otherwise.
+    fn require_kept(&self, plan: &Plan, target: &Path, (path, name): (&Path, &str)) -> Outcome<()> {
+        let known = StatisticsFile::read(target)?.statistics;
+        let (robot, source) = (&self.robot.robot, checksum_of_log(path)?);
+        let other = if known.plan != *plan {
+            "of another plan"
+        } else if known.robot != *robot || known.robot_name != self.robot_name {
+            "of another robot"
+        } else if !known.log_names().eq([name]) || !known.sources().eq([source.as_str()]) {
+            "of another log"
+        } else if !known.readings().eq([self.reading(path)]) {
+            "of the log as other settings read it ([columns], [[log]], --rate, --lenient)"
+        } else {
+            return Ok(());
+        };
+        Err(Failure::usage(
+            format!("{} is there, {other}", target.to_string_lossy()),
+            "make it anew with --force, or give another folder with -o",
+        ))
+    }
 }
 
-/// A plan that was written before.
-fn read_plan(path: &Path) -> Outcome<Plan> {
+/// A plan for this robot that was written before.
+fn read_plan(path: &Path, robot: &Robot) -> Outcome<Plan> {
     let name = path.to_string_lossy().into_owned();
     let remedy = "give a plan that `twincal statistics` wrote, or --plan auto";
     let bytes = InputFile::new(path, MAX_PLAN)
@@ -273,7 +286,7 @@ fn read_plan(path: &Path) -> Outcome<Plan> {
         let problem = format!("is no plan: {e}");
         Error::content(Place::file(&name), problem, remedy)
     })?;
-    plan.require_version()?;
+    plan.require_for(robot)?;
     Ok(plan)
 }
 

@@ -39,7 +39,7 @@ pub(crate) mod stamps;
 mod torque;
 
 #[cfg(feature = "tables")]
-pub(crate) use arrow::{Row, Rows, fits};
+pub(crate) use arrow::{ANEW, Row, Rows, fits};
 pub(crate) use assemble::assemble;
 pub(crate) use cells::Cells;
 pub(crate) use columns::has_columns;
@@ -50,6 +50,7 @@ pub use torque::{TorqueOptions, TorqueSource};
 
 #[cfg(feature = "bags")]
 use self::bag::read as read_bag;
+use crate::artifact::sha256;
 use crate::config::ColumnsTable;
 use crate::error::{Error, Place, Result};
 use crate::open::open_log_file;
@@ -86,6 +87,14 @@ pub struct LogOptions {
     pub torque: TorqueOptions,
     /// What the robot carried (`[[log]] payload`); handed on as it is.
     pub payload: Payload,
+}
+
+impl LogOptions {
+    /// SHA-256 of all of them: a log that is read otherwise is another log.
+    #[must_use]
+    pub fn checksum(&self) -> String {
+        sha256(format!("{self:?}").as_bytes())
+    }
 }
 
 /// Reads one log: CSV with any delimiter, Parquet, Arrow, NPZ, MCAP, a SQLite bag (told by their first bytes, not by their names) or the folder

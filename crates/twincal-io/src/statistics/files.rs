@@ -54,8 +54,9 @@ impl StatisticsFiles {
             let (metadata, batches) = look(path)?;
             match &common {
                 None => {
-                    let version = metadata.header.plan.require_version();
-                    version.map_err(|e| of_file(path, e))?;
+                    let Header { plan, robot, .. } = &metadata.header;
+                    let fits = plan.require_for(robot);
+                    fits.map_err(|e| of_file(path, e))?;
                     common = Some(metadata.header);
                 }
                 Some(first) => {

@@ -18,17 +18,16 @@ use crate::artifact::sha256;
 use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
+use twincal::Finding;
 use twincal::calibrate::{Header, Identity, LogHeader, Quantity, Statistics};
 
 /// What this version writes.
-const FORMAT: u32 = 2;
+const FORMAT: u32 = 3;
 /// Key of the schema's metadata, and the names of the columns.
 const KEY: &str = "twincal.statistics";
 const COLUMNS: [&str; 2] = ["log", "value"];
 /// Largest file, bytes: some thousand logs of ten minutes.
 const MAX_BYTES: u64 = 16 << 30;
-/// What helps where a file is not as it was written.
-const REMEDY: &str = "make it anew with `twincal statistics --force`";
 
 /// Statistics with the model file that their robot was read from.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,7 +39,7 @@ pub struct StatisticsFile {
 }
 
 /// A model file as it was.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ModelFile {
     /// Name as given.
     pub name: String,
@@ -50,6 +49,8 @@ pub struct ModelFile {
     pub robot: String,
     /// The file.
     pub text: String,
+    /// What was found when it was read.
+    pub findings: Vec<Finding>,
 }
 
 /// The JSON of the metadata.

@@ -1,9 +1,9 @@
 //! One file of statistics: what it holds, and its rows.
 
-use super::{Entry, FORMAT, Format, KEY, MAX_BYTES, Metadata, REMEDY, RowText};
+use super::{Entry, FORMAT, Format, KEY, MAX_BYTES, Metadata, RowText};
 use crate::artifact::sha256;
 use crate::error::{Error, Place, Result};
-use crate::log::{Row, Rows};
+use crate::log::{ANEW, Row, Rows};
 use crate::open::{InputFile, Refusal};
 use std::fs::File;
 use std::path::Path;
@@ -15,7 +15,7 @@ use twincal::calibrate::{LogTable, Record};
 /// [`Error::Content`] for another file, format or checksum of the metadata.
 pub(super) fn look(path: &Path) -> Result<(Metadata, Vec<u64>)> {
     let name = path.display().to_string();
-    let refuse = |problem: String| Error::content(Place::file(&name), problem, REMEDY);
+    let refuse = |problem: String| Error::content(Place::file(&name), problem, ANEW);
     let rows = Rows::open(opened(path)?, &name)?;
     let text = rows.metadata(KEY)?.ok_or_else(|| {
         Error::content(
@@ -29,7 +29,7 @@ pub(super) fn look(path: &Path) -> Result<(Metadata, Vec<u64>)> {
     if format != FORMAT {
         let remedy = match format > FORMAT {
             true => "read it with a newer version of twincal",
-            false => REMEDY,
+            false => ANEW,
         };
         let problem = format!("has format {format}, this program reads {FORMAT}");
         return Err(Error::content(Place::file(&name), problem, remedy));
@@ -60,7 +60,7 @@ fn opened(path: &Path) -> Result<File> {
 
 fn damaged(name: &str) -> Error {
     let problem = "is damaged: its checksum is another one";
-    Error::content(Place::file(name), problem, REMEDY)
+    Error::content(Place::file(name), problem, ANEW)
 }
 
 /// A file that was looked at.
@@ -79,7 +79,7 @@ impl Reader {
     }
 
     pub(super) fn refuse(&self, problem: String) -> Error {
-        Error::content(Place::file(&self.name), problem, REMEDY)
+        Error::content(Place::file(&self.name), problem, ANEW)
     }
 
     /// A row as it stands there and what its text says, checked against what the metadata say of it.

@@ -68,6 +68,7 @@ fn of_log(name: &str, seed: u64) -> StatisticsFile {
             stored_as: "model.urdf".into(),
             robot: "pendulum".into(),
             text: "<robot name=\"pendulum\"/>".into(),
+            findings: Vec::new(),
         },
     }
 }

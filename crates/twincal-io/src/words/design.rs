@@ -1,11 +1,7 @@
 //! What a designed motion is and what it is expected to decide, in sentences and cells of tables.
 
-use super::NAMED;
-use super::list::{first_of, list};
 use super::number::{THIN, fixed, number, probability};
 use crate::collision::CollisionWorld;
-use twincal::assess::open_effects;
-use twincal::calibrate::Calibration;
 use twincal::design::{
     Criterion, Design, JERK_TIME, JointLimits, Load, OtherRecording, Promise, Recorded, SPEED_UP,
 };
@@ -19,28 +15,6 @@ pub const DECIDED: &str = "Decided: the PIP leaves 0.05 to 0.95 in logs simulate
     Expected sd: median sd of the first coefficient afterwards, in SI units, where the effect is there.";
 /// Stands where a limit would.
 pub const NOT_LIMITED: &str = "not limited";
-
-/// The line that designs a motion for what a fit leaves open; `folder`: that of the twin. `None` where nothing is open. With a file of
-/// limits where the model has no velocity limit of a joint.
-#[must_use]
-pub fn command(calibration: &Calibration, folder: &str) -> Option<String> {
-    let open = open_effects(calibration).into_iter().map(str::to_owned);
-    let open: Vec<String> = open.collect();
-    if open.is_empty() {
-        return None;
-    }
-    let names = list(&first_of(open, NAMED));
-    let robot = &calibration.twin.robot;
-    let unlimited = (0..robot.joint_names().len())
-        .any(|joint| robot.joint(joint).limits.velocity.is_none_or(|v| v <= 0.0));
-    let limits = match unlimited {
-        true => " --limits limits.toml",
-        false => "",
-    };
-    Some(format!(
-        "twincal design --twin {folder}{limits} -o motion designs a motion to decide {names}."
-    ))
-}
 
 /// Length and rate: "Motion of 20 s at 500 Hz".
 #[must_use]
@@ -326,74 +300,6 @@ mod tests {
 
     /// Effects between 0.05 and 0.95, where the regression is at hand and nothing doubts the log.
     #[cfg(feature = "report")]
-    #[test]
-    fn the_line_names_what_is_open_and_stands_only_where_a_design_can_begin() {
-        use crate::report::fixture;
-        use twincal::assess::{RequestCode, assess};
-        use twincal::calibrate::{Alike, Group};
-        use twincal::posterior::Problem;
-        use twincal::prior::{Inclusion, Prior};
-        use twincal::{Code, Finding, Severity};
-        let none = Problem {
-            gram: Vec::new(),
-            xy: Vec::new(),
-            yy: 0.0,
-            n: 0.0,
-            log_constant: 0.0,
-            prior: Prior::single(
-                Vec::new(),
-                Vec::new(),
-                Inclusion::Probability(0.5),
-                (1.0, 1.0),
-            ),
-            names: Vec::new(),
-        };
-        let mut own = fixture::two_joints();
-        own.findings.clear();
-        let pips = [0.04, 0.05, 0.5, 0.9, 0.94, 0.95];
-        assert!(own.components.len() >= pips.len());
-        own.components.truncate(pips.len());
-        for (component, pip) in own.components.iter_mut().zip(pips) {
-            component.pip = Some(pip);
-        }
-        assert_eq!(command(&own, "out"), None, "no regression");
-        own.problem = Some(none);
-        let name = |at: usize| own.components[at].name.clone();
-        let said = format!(
-            "twincal design --twin out -o motion designs a motion to decide {}, {}, {} and 1 more.",
-            name(1),
-            name(2),
-            name(3)
-        );
-        assert_eq!(command(&own, "out"), Some(said));
-        let asked = assess(&own).next;
-        let asked = asked.iter().map(|own| (own.code, own.subject.name()));
-        let designed = |at: &usize| {
-            (
-                RequestCode::DesignedMotion,
-                own.components[*at].name.as_str(),
-            )
-        };
-        assert!(asked.eq([1, 2, 3, 4].iter().map(designed)));
-        let mut structural = own.clone();
-        structural.groups.push(Group {
-            members: [1, 2, 3, 4].map(name).to_vec(),
-            pip: 0.9,
-            alike: Alike::EveryMotion,
-            settled: false,
-            words: String::new(),
-        });
-        assert_eq!(command(&structural, "out"), None, "no motion decides");
-        let code = Code::SignFlip;
-        own.findings = vec![Finding::new(Severity::Warning, code, "log", "", 1)];
-        assert_eq!(command(&own, "out"), None, "a doubtful log");
-        own.findings.clear();
-        own.components
-            .iter_mut()
-            .for_each(|own| own.pip = Some(0.99));
-        assert_eq!(command(&own, "out"), None, "nothing open");
-    }
-
     fn limits(joint: &str, assumed: &[&'static str]) -> JointLimits {
         JointLimits {
             joint: joint.into(),

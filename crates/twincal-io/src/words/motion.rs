@@ -14,13 +14,21 @@ pub struct NextMotion {
     pub decides: String,
 }
 
-/// The motion for a twin that lies in `folder`; `None` where nothing is open.
+/// The motion for a twin that lies in `folder`; `None` where nothing is open. With a file of limits where the model has no velocity limit of
+/// a joint.
 #[must_use]
 pub fn next_motion(calibration: &Calibration, folder: &str) -> Option<NextMotion> {
     let open = open_effects(calibration).into_iter().map(str::to_owned);
     let open: Vec<String> = open.collect();
+    let robot = &calibration.twin.robot;
+    let unlimited = (0..robot.joint_names().len())
+        .any(|joint| robot.joint(joint).limits.velocity.is_none_or(|v| v <= 0.0));
+    let limits = match unlimited {
+        true => " --limits limits.toml",
+        false => "",
+    };
     (!open.is_empty()).then(|| NextMotion {
-        command: format!("twincal design --twin {folder} -o motion"),
+        command: format!("twincal design --twin {folder}{limits} -o motion"),
         decides: list(&first_of(open, NAMED)),
     })
 }

@@ -1,6 +1,7 @@
 //! Logs that are in a set once: not under two names, and not at the same time.
 
 use crate::error::{Error, Result};
+use std::fmt;
 
 /// Stamps behind it are seconds since 1970, s: September 2001.
 const ABSOLUTE: f64 = 1e9;
@@ -46,6 +47,13 @@ impl Fnv {
     }
 }
 
+impl fmt::Write for Fnv {
+    fn write_str(&mut self, text: &str) -> fmt::Result {
+        self.add_bytes(text.as_bytes());
+        Ok(())
+    }
+}
+
 /// Two logs that cannot both be there.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Clash {
@@ -81,7 +89,12 @@ pub fn clash(logs: &[Identity<'_>]) -> Option<Clash> {
             format!("log `{other}` is log `{one}` under another name"),
         );
     }
-    all = named;
+    overlap(&named)
+}
+
+/// The first two of these logs, which come with their places, that overlap in time by absolute stamps.
+fn overlap(logs: &[(usize, Identity<'_>)]) -> Option<Clash> {
+    let mut all = logs.to_vec();
     all.retain(|(_, own)| own.ends[0] > ABSOLUTE);
     all.sort_by(|(_, a), (_, b)| a.ends[0].total_cmp(&b.ends[0]));
     // Of those that began before, the one that ends last.
@@ -94,7 +107,8 @@ pub fn clash(logs: &[Identity<'_>]) -> Option<Clash> {
                 "logs `{}` and `{}` overlap in time by {both:.1} s",
                 names[0], names[1]
             );
-            return found([before, own], problem);
+            let logs = [before.0, own.0];
+            return Some(Clash { logs, problem });
         }
         last = match last {
             Some(before) if before.1.ends[1] >= own.1.ends[1] => Some(before),
@@ -112,6 +126,19 @@ pub(super) fn require_distinct(logs: &[Identity<'_>]) -> Result<()> {
         Some(Clash { problem, .. }) => Err(Error::Statistics {
             problem,
             remedy: "give every log once".into(),
+        }),
+    }
+}
+
+/// # Errors
+/// [`Error::Statistics`] where a held-out log overlaps in time with a fitted one or another.
+pub(super) fn require_apart(logs: &[Identity<'_>]) -> Result<()> {
+    let placed: Vec<(usize, Identity<'_>)> = logs.iter().copied().enumerate().collect();
+    match overlap(&placed) {
+        None => Ok(()),
+        Some(Clash { problem, .. }) => Err(Error::Statistics {
+            problem,
+            remedy: "hold out logs that the fit does not see, and each once".into(),
         }),
     }
 }

@@ -9,11 +9,13 @@ use super::checks::worse;
 use super::data::all_logs::{self, Data};
 use super::data::facts::{Facts, LogFacts};
 use super::data::reader::Reader;
+use super::distinct::{Identity, require_apart};
 use super::fit::columns::columns_of;
 use super::fit::compact;
 use super::fit::dissipative;
 use super::fit::fitted::{self, Fitted};
 use super::fit::noise_of::noise_of;
+use super::like::require_like;
 use super::log_statistics::{LogStatistics, Statistics, require_read_back};
 use super::plan::require_even_rows;
 use super::pooled::Pooled;
@@ -24,14 +26,15 @@ use super::result::unseen;
 use super::settings::CalibrationSettings;
 use super::stages;
 use super::stopped::Stopped;
-use crate::error::{Error, Finding, Result};
+use crate::cross_check::{Sketch, sketched_copies};
+use crate::error::{Finding, Result};
 use crate::gram::Gram;
 use crate::infer::infer_near;
 use crate::likelihood::{Columns, Spread};
 use crate::posterior::Posterior;
 use crate::robot::Robot;
 use crate::self_check::self_check;
-use crate::signal::{Logs, ReadyLog, ready};
+use crate::signal::{Log, Logs, ReadyLog, less_driven, ready, torque_rms};
 use crate::statistics::{Purpose, Sums, residual_form};
 use crate::term::Library;
 use crate::twin::Twin;
@@ -42,7 +45,8 @@ use crate::twin::Twin;
 /// is not looked for: drift, heavy tails, noise that varies, other cut-offs.
 ///
 /// # Errors
-/// [`Error::Statistics`] without logs or with a plan of another version, [`Error::Setting`] for noise that weighs rows, and those of a
+/// [`Error::Statistics`](crate::Error::Statistics) without logs, with a plan of another version and for torque of several units;
+/// [`Error::Setting`](crate::Error::Setting) for noise that weighs rows, and those of a
 /// calibration; each with what was found before.
 pub fn calibrate_statistics<'a>(
     statistics: &Statistics,
@@ -93,7 +97,7 @@ fn road(
     findings: &mut Vec<Finding>,
 ) -> Result<Calibration> {
     let (robot, plan) = (&statistics.robot, &statistics.plan);
-    plan.require_version()?;
+    plan.require_for(robot)?;
     require_even_rows(settings)?;
     require_like(statistics)?;
     let mut settings = settings.clone();
@@ -126,6 +130,7 @@ fn road(
         fit,
     };
     let (data, trajectories) = held_out_rows(statistics, library, heldout)?;
+    findings.extend(compared(statistics, (heldout, &data))?);
     findings.extend(data.findings.iter().cloned());
     let pipeline = &statistics.plan.pipeline;
     findings.extend(self_check(robot, pipeline, trajectories.heldout.iter())?);
@@ -185,7 +190,7 @@ fn known(
 ) -> Result<Known> {
     let (robot, plan) = (&statistics.robot, &statistics.plan);
     let (every_candidate, more) = Library::propose(robot, &plan.library)?;
-    findings.extend(more);
+    findings.extend(plan.findings.iter().cloned().chain(more));
     for log in &statistics.logs {
         findings.extend(log.about.findings.iter().cloned());
     }
@@ -295,6 +300,36 @@ fn out_of_band(statistics: &Statistics, known: &Known, beta: &[f64]) -> Vec<f64>
     (0..statistics.robot.dof()).map(of_joint).collect()
 }
 
+/// What logs say of each other: copies, and joints that are hardly driven in some of them.
+///
+/// # Errors
+/// [`Error::Statistics`](crate::Error::Statistics) for a held-out log from the time of another, and those of chapters that cannot be read.
+fn compared(statistics: &Statistics, (heldout, data): (&Logs<'_>, &Data)) -> Result<Vec<Finding>> {
+    let fitted = || statistics.logs.iter();
+    let mut all: Vec<Identity<'_>> = fitted().map(LogStatistics::identity).collect();
+    all.extend(data.heldout.iter().map(|log| Identity {
+        name: &log.summary.name,
+        source: "",
+        ends: log.ends.map(|stamp| log.origin + stamp),
+        sums: 0,
+    }));
+    require_apart(&all)?;
+    let robot = &statistics.robot;
+    let noise = heldout.0.iter().map(|log| Sketch::of(log, robot.dof()));
+    let noise: Vec<Sketch> = noise.collect::<Result<_>>()?;
+    let named = heldout.0.iter().map(Log::name).zip(&noise);
+    let known = fitted().map(|log| (log.name(), &log.noise));
+    let mut findings = sketched_copies(&known.chain(named).collect::<Vec<_>>());
+    let mut sizes: Vec<(String, Vec<Option<f64>>)> = fitted()
+        .map(|log| (log.name().to_owned(), log.torque_rms()))
+        .collect();
+    for log in &heldout.0 {
+        sizes.push((log.name().to_owned(), torque_rms(log)?));
+    }
+    findings.extend(less_driven(robot, &sizes));
+    Ok(findings)
+}
+
 /// Rows and motion of the held-out logs.
 fn held_out_rows(
     statistics: &Statistics,
@@ -312,53 +347,4 @@ fn held_out_rows(
         .map(|log| ready(robot, log, &plan.pipeline))
         .collect::<Result<_>>()?;
     Data::read_heldout(reader, &logs)
-}
-
-/// The robot's torque in some unit that the other logs do not have is seen by its size: of three logs or more each has to be within this factor of
-/// the median on some joint that moves.
-const ODD: f64 = 30.0;
-
-/// # Errors
-/// [`Error::Statistics`] without logs, and for a log whose torque is of another size than that of all others on every joint.
-fn require_like(statistics: &Statistics) -> Result<()> {
-    let refused = |problem: String, remedy: &str| {
-        Err(Error::Statistics {
-            problem,
-            remedy: remedy.into(),
-        })
-    };
-    let logs = &statistics.logs;
-    if logs.is_empty() {
-        return refused("no log".into(), "give statistics of one log at least");
-    }
-    if logs.len() < 3 {
-        return Ok(());
-    }
-    let size = |log: &LogStatistics, joint: usize| {
-        let sums = &log.sums;
-        let squares: f64 = sums.joints[joint].blocks.iter().map(|own| own.torque).sum();
-        (squares / sums.rows.iter().sum::<usize>().max(1) as f64).sqrt()
-    };
-    for log in logs {
-        let odd = |joint: usize| {
-            let mut sizes: Vec<f64> = logs.iter().map(|log| size(log, joint)).collect();
-            sizes.sort_by(f64::total_cmp);
-            let ratio = size(log, joint) / sizes[sizes.len() / 2];
-            (ratio > 0.0 && ratio.is_finite()).then_some(ratio)
-        };
-        let ratios: Vec<f64> = (0..statistics.robot.dof()).filter_map(odd).collect();
-        let all = |is: fn(f64) -> bool| !ratios.is_empty() && ratios.iter().all(|ratio| is(*ratio));
-        if all(|ratio| ratio > ODD) || all(|ratio| ratio < 1.0 / ODD) {
-            let mean = ratios.iter().map(|ratio| ratio.ln()).sum::<f64>() / ratios.len() as f64;
-            return refused(
-                format!(
-                    "the torque of log `{}` is {} times that of the others on every joint",
-                    log.name(),
-                    crate::words::significant(mean.exp(), 2)
-                ),
-                "leave the log out, or make its statistics with its unit of torque",
-            );
-        }
-    }
-    Ok(())
 }

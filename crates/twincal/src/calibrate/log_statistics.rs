@@ -5,17 +5,18 @@ use super::data::facts::LogFacts;
 use super::data::log::Log;
 use super::data::reader::{Reader, Role};
 use super::distinct::{Fnv, Identity, require_distinct};
-use super::plan::{Plan, VERSION};
-use crate::cross_check::stuck_encoders;
+use super::plan::Plan;
+use crate::cross_check::{Sketch, stuck_encoders};
 use crate::error::{Error, Finding, Result};
 use crate::gram::{JointAccumulator, JointGram, Workspace};
 use crate::observations::Observations;
 use crate::robot::Robot;
 use crate::rows::{RowBlock, RowSignal, visit_parts};
-use crate::self_check::self_check;
-use crate::signal::{self, Payload, Trajectory, constant_torque, hardly_driven, ready};
+use crate::self_check::{Look, look};
+use crate::signal::{self, Payload, Trajectory, constant_torque, ready};
 use crate::statistics::{BLOCKS, LogSums};
 use crate::term::Library;
+use crate::words::{quoted, significant};
 use serde::{Deserialize, Serialize};
 
 /// Statistics of logs of one robot under one plan, in the order of their names. Those of other logs can be added, and a fit takes nothing else.
@@ -59,6 +60,8 @@ pub(crate) struct LogStatistics {
     pub(crate) sums: LogSums,
     /// Per joint, over the signals: of torque as logged, and of filtered rows at the same times. Empty without a filter.
     pub(crate) raw: Vec<[JointGram; 2]>,
+    /// The noise of its torque: copies are found by it.
+    pub(crate) noise: Sketch,
 }
 
 /// What else is known of a log.
@@ -67,6 +70,8 @@ pub(crate) struct About {
     pub(crate) facts: LogFacts,
     /// SHA-256 of the file, where there is one: the same log twice is found by it.
     pub(crate) source: String,
+    /// Checksum of the settings that it was read with, where there is a file.
+    pub(crate) reading: String,
     /// What was found while it was read.
     pub(crate) findings: Vec<Finding>,
 }
@@ -75,7 +80,7 @@ impl Statistics {
     /// Statistics of one log; `source` is the checksum of its file, or empty.
     ///
     /// # Errors
-    /// [`Error::Statistics`] for a plan of another version, for a log without rows and for one that carries something unknown where no log of
+    /// [`Error::Statistics`] for a plan of another version or robot, for a log without rows and for one that carries something unknown where no log of
     /// the plan did; those of logs.
     pub fn of(
         (robot_name, robot): (&str, &Robot),
@@ -83,7 +88,7 @@ impl Statistics {
         log: &signal::Log<'_>,
         source: &str,
     ) -> Result<Self> {
-        plan.require_version()?;
+        plan.require_for(robot)?;
         let names = robot.joint_names();
         log.any_recording(|recording| recording.require_torque(&names))?;
         let payload = log.payload();
@@ -108,13 +113,16 @@ impl Statistics {
         let given = log;
         let (log, trajectory) = reader.log(&read, Role::Fit(&[]), &mut findings)?;
         let motion = std::iter::once(&trajectory);
-        findings.extend(self_check(robot, &plan.pipeline, motion)?);
+        let compared = look(robot, &plan.pipeline, motion)?;
+        require_unit(given.name(), &compared)?;
+        findings.extend(compared.findings);
         if log.observations.is_empty() {
             return Err(Error::Statistics {
                 problem: format!("log `{}` has no row behind the filters", log.summary.name),
                 remedy: "leave the log out".into(),
             });
         }
+        let noise = Sketch::of(given, robot.dof())?;
         let raw = raw((robot, &library), plan, &log, &trajectory)?;
         let sums = LogSums::of(&log.observations.whole(), BLOCKS).with_runs(plan.runs());
         require_read_back(given)?;
@@ -125,19 +133,22 @@ impl Statistics {
             logs: vec![LogStatistics {
                 sums,
                 raw,
+                noise,
                 about: About {
                     facts: LogFacts::of(&log, payload),
                     source: source.to_owned(),
+                    reading: String::new(),
                     findings,
                 },
             }],
         })
     }
 
-    /// The same with what was found while the file of its only log was read.
+    /// The same with how the file of its only log was read (a checksum of the settings), and what was found meanwhile.
     #[must_use]
-    pub fn with_findings(mut self, findings: Vec<Finding>) -> Self {
+    pub fn with_reading(mut self, reading: String, findings: Vec<Finding>) -> Self {
         if let Some(log) = self.logs.first_mut() {
+            log.about.reading = reading;
             log.about.findings.splice(0..0, findings);
         }
         self
@@ -154,6 +165,11 @@ impl Statistics {
     pub fn sources(&self) -> impl Iterator<Item = &str> {
         let sources = self.logs.iter().map(|log| log.about.source.as_str());
         sources.filter(|source| !source.is_empty())
+    }
+
+    /// Checksums of the settings that the logs were read with; empty where there was no file.
+    pub fn readings(&self) -> impl Iterator<Item = &str> {
+        self.logs.iter().map(|log| log.about.reading.as_str())
     }
 
     /// Adds the statistics of other logs of the same robot under the same plan.
@@ -191,10 +207,22 @@ pub(super) fn require_same(own: Common<'_>, other: Common<'_>) -> Result<()> {
             ),
             "make all of them with one version of the program",
         )
-    } else if name != other_name || robot != other_robot {
+    } else if name != other_name {
         (
-            format!("of robot `{other_name}`, the others of `{name}`, or of another model file"),
+            format!("of robot `{other_name}`, the others of `{name}`"),
             "merge statistics of one robot; say with --robot which one was logged",
+        )
+    } else if robot != other_robot {
+        let [joints, others] = [other_robot, robot].map(|own| quoted(own.joint_names()));
+        let problem = match joints == others {
+            true => "of another model file than the others".into(),
+            false => {
+                format!("of a model with joints {joints}, the others with {others}, in this order")
+            }
+        };
+        (
+            problem,
+            "make all of them with one model file: twincal statistics --model FILE",
         )
     } else if plan != other_plan {
         (
@@ -221,11 +249,34 @@ pub(super) fn require_read_back(log: &signal::Log<'_>) -> Result<()> {
     }
 }
 
+/// Factor between measured and nominal torque which is a unit and not a gear: N·mm is 1000, gears go to 300.
+const UNIT: f64 = 400.0;
+
+/// # Errors
+/// [`Error::Log`] for torque of a unit that no finding makes usable.
+fn require_unit(log: &str, compared: &Look) -> Result<()> {
+    let odd = |times: f64| !(1.0 / UNIT..=UNIT).contains(&times);
+    let Some((joint, times)) = compared.sizes.iter().find(|(_, times)| odd(*times)) else {
+        return Ok(());
+    };
+    let joints = match joint {
+        Some(joint) => format!("joint `{joint}`"),
+        None => "all joints".into(),
+    };
+    Err(Error::Log {
+        log: log.to_owned(),
+        problem: format!(
+            "the torque of {joints} is {} times the model's, which is another unit",
+            significant(*times, 3)
+        ),
+        remedy: "give what makes N·m of it in [columns.factor] tau, or what the column holds in [[log]] torque".into(),
+    })
+}
+
 /// What a log as recorded says of itself.
 fn as_recorded(robot: &Robot, log: &signal::Log<'_>) -> Result<Vec<Finding>> {
     let one = || vec![log.lent()];
     let mut findings = constant_torque(robot, one())?;
-    findings.extend(hardly_driven(robot, one())?);
     findings.extend(stuck_encoders(robot, &one())?);
     Ok(findings)
 }
@@ -252,29 +303,24 @@ impl LogStatistics {
         }
     }
 
+    /// Root mean square of each joint's torque, N·m or N.
+    pub(crate) fn torque_rms(&self) -> Vec<Option<f64>> {
+        let rows = self.sums.rows.iter().sum::<usize>().max(1) as f64;
+        let squares = self.sums.joints.iter().map(|joint| {
+            let squares = joint.blocks.iter().map(|own| own.torque);
+            squares.sum::<f64>()
+        });
+        squares
+            .map(|squares| Some((squares / rows).sqrt()))
+            .collect()
+    }
+
     /// The same with stretches twice as long.
     pub(crate) fn coarse(&self) -> Self {
         Self {
             sums: self.sums.coarse(),
             ..self.clone()
         }
-    }
-}
-
-impl Plan {
-    /// # Errors
-    /// [`Error::Statistics`] for a plan of another version.
-    pub fn require_version(&self) -> Result<()> {
-        if self.version == VERSION {
-            return Ok(());
-        }
-        Err(Error::Statistics {
-            problem: format!(
-                "the plan has version {}, this program {VERSION}",
-                self.version
-            ),
-            remedy: "make the plan with this program: twincal statistics --plan auto".into(),
-        })
     }
 }
 

@@ -7,6 +7,7 @@ mod distinct;
 mod exit;
 mod fit;
 mod from_statistics;
+mod like;
 mod log_statistics;
 mod outlook;
 mod plan;

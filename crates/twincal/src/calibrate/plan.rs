@@ -1,5 +1,6 @@
 //! The plan: what must be the same for all logs whose statistics are to be added.
 
+use super::distinct::Fnv;
 use super::exit::{Exit, Pass};
 use super::fit::relinearise;
 use super::request::{Recorded, Request};
@@ -7,10 +8,13 @@ use super::settings::CalibrationSettings;
 use super::stages;
 use crate::error::{Error, Finding, Result};
 use crate::likelihood::NoiseModel;
+use crate::robot::Robot;
 use crate::signal::{Logs, Pipeline};
 use crate::statistics::Runs;
 use crate::term::LibrarySettings;
+use crate::words::quoted;
 use serde::{Deserialize, Serialize};
+use std::fmt::Write as _;
 
 /// Version of what statistics hold and mean.
 pub const VERSION: u32 = 1;
@@ -23,6 +27,8 @@ pub const VERSION: u32 = 1;
 pub struct Plan {
     /// [`VERSION`] of the program that made it.
     pub version: u32,
+    /// Checksum (FNV-1a) of the robot that it was made for: its description and its locked joints.
+    pub robot: u64,
     /// The likelihood of the fit: it goes with the band of the filters.
     pub noise: NoiseModel,
     /// The payload component acts only in logs that say they carry something unknown.
@@ -31,6 +37,8 @@ pub struct Plan {
     pub pipeline: Pipeline,
     /// Candidates, with reversal velocity, periods of gear ripple and the effects that columns are worked out about.
     pub library: LibrarySettings,
+    /// What was found while the pipeline was chosen.
+    pub findings: Vec<Finding>,
 }
 
 impl Plan {
@@ -41,6 +49,58 @@ impl Plan {
             NoiseModel::Iid | NoiseModel::Tempered => Runs::Apart,
         }
     }
+
+    /// # Errors
+    /// [`Error::Statistics`] for a plan of another version or robot, and for filters that no plan has.
+    pub fn require_for(&self, robot: &Robot) -> Result<()> {
+        match self.unfit_for(robot) {
+            None => Ok(()),
+            Some(problem) => Err(Error::Statistics {
+                problem,
+                remedy:
+                    "make the plan with this program and this robot: twincal statistics --plan auto"
+                        .into(),
+            }),
+        }
+    }
+
+    /// Why logs of this robot cannot be read under it.
+    fn unfit_for(&self, robot: &Robot) -> Option<String> {
+        if self.version != VERSION {
+            let own = self.version;
+            return Some(format!(
+                "the plan has version {own}, this program {VERSION}"
+            ));
+        }
+        if self.robot != checksum(robot) {
+            let joints = quoted(robot.joint_names());
+            return Some(format!(
+                "the plan was made for another robot or model file than this one with joints {joints}"
+            ));
+        }
+        let [filters, candidates] = [
+            self.pipeline.coulomb_velocity,
+            self.library.coulomb_velocity,
+        ];
+        if filters != candidates {
+            return Some(format!(
+                "the plan has coulomb_velocity {filters} in its pipeline and {candidates} in its library"
+            ));
+        }
+        let (key, value) = self.pipeline.unsound(robot)?;
+        let joints = robot.dof();
+        Some(format!(
+            "the plan has pipeline.{key} = {value}, of which no filter for {joints} joints can be made"
+        ))
+    }
+}
+
+/// Checksum of a robot.
+fn checksum(robot: &Robot) -> u64 {
+    let mut sum = Fnv::new();
+    // Nothing refuses text here.
+    let _ = write!(sum, "{:?} {:?}", robot.description(), robot.locked());
+    sum.sum()
 }
 
 /// What the columns of a plan are worked out about.
@@ -75,10 +135,12 @@ pub(super) fn road(
     }
     Ok(Plan {
         version: VERSION,
+        robot: checksum(request.robot),
         noise: rows.prepared.settings.noise.model,
         payload_where_unknown: rows.prepared.unknown,
         pipeline: rows.prepared.pipeline,
         library: rows.prepared.library_settings,
+        findings: rows.prepared.of_pipeline,
     })
 }
 

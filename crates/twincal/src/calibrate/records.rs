@@ -3,6 +3,7 @@
 use super::distinct::{Identity, require_distinct};
 use super::log_statistics::{About, LogStatistics, Statistics, require_same};
 use super::plan::Plan;
+use crate::cross_check::Sketch;
 use crate::error::{Error, Result};
 use crate::excitation::States;
 use crate::gram::{JointGram, Symmetric};
@@ -118,11 +119,13 @@ pub enum Quantity {
     Accelerations,
     /// 1 where the joint stands still there, else 0.
     Still,
+    /// Hashes of patterns in the noise of its torque, ascending: copies of a log have the same.
+    Noise,
 }
 
 impl Quantity {
     /// All of them.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 15] = [
         Self::Products,
         Self::Differences,
         Self::First,
@@ -137,6 +140,7 @@ impl Quantity {
         Self::Velocities,
         Self::Accelerations,
         Self::Still,
+        Self::Noise,
     ];
 
     /// Its name in files.
@@ -157,6 +161,7 @@ impl Quantity {
             Self::Velocities => "velocities",
             Self::Accelerations => "accelerations",
             Self::Still => "still",
+            Self::Noise => "noise",
         }
     }
 
@@ -191,6 +196,7 @@ impl LogStatistics {
         for (joint, sums) in (0..).zip(&self.sums.joints) {
             records.extend(of_joint(joint, sums, self.raw.get(joint as usize)));
             records.extend(of_states(joint, &self.about.facts.states));
+            records.push(of_noise(joint, &self.noise));
         }
         LogTable { header, records }
     }
@@ -224,9 +230,9 @@ impl FromTables {
     /// Without a log.
     ///
     /// # Errors
-    /// [`Error::Statistics`] for another version; those of [`Library::propose`].
+    /// [`Error::Statistics`] for a plan of another version or robot; those of [`Library::propose`].
     pub fn new(header: Header) -> Result<Self> {
-        header.plan.require_version()?;
+        header.plan.require_for(&header.robot)?;
         let (library, _) = Library::propose(&header.robot, &header.plan.library)?;
         let statistics = Statistics {
             robot_name: header.robot_name,
@@ -313,6 +319,17 @@ fn of_states(joint: u32, states: &States) -> [Record; 4] {
         runs: 0.0,
         values,
     })
+}
+
+fn of_noise(joint: u32, noise: &Sketch) -> Record {
+    Record {
+        joint,
+        quantity: Quantity::Noise,
+        block: 0,
+        rows: 0.0,
+        runs: 0.0,
+        values: noise.numbers(joint as usize),
+    }
 }
 
 fn of_joint(joint: u32, sums: &JointSums, raw: Option<&[JointGram; 2]>) -> Vec<Record> {
@@ -408,6 +425,7 @@ impl Taken<'_> {
             );
         }
         facts.states = self.states(joints)?;
+        let noise = self.noise(joints)?;
         let acts = !self.plan.payload_where_unknown || facts.payload == Payload::Unknown;
         let recipes = recipes_of_log(library, acts);
         let filtered = self.plan.pipeline.cutoff_hz != 0.0;
@@ -431,7 +449,16 @@ impl Taken<'_> {
                 joints: sums,
             },
             raw,
+            noise,
         })
+    }
+
+    /// The noise of all joints.
+    fn noise(&mut self, joints: usize) -> Result<Sketch> {
+        let numbers = (0..joints).map(|joint| Ok(self.take(joint, Quantity::Noise, 0)?.values));
+        let numbers = numbers.collect::<Result<Vec<_>>>()?;
+        let noise = Sketch::of_numbers(&numbers);
+        noise.ok_or_else(|| self.damaged("has a noise of torque that is none"))
     }
 
     /// States of all joints, as many of each.

@@ -4,9 +4,11 @@ mod common_fit;
 mod copies;
 mod rows;
 mod signature;
+mod sketch;
 mod stuck;
 mod torque;
 
 pub use copies::copies;
+pub use sketch::{Sketch, sketched_copies};
 pub use stuck::stuck_encoders;
 pub use torque::odd_torque;

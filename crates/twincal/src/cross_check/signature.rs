@@ -12,7 +12,7 @@ const MOST_ROWS: usize = 1 << 22;
 /// Joints whose signs are kept.
 pub(super) const MOST_JOINTS: usize = 32;
 /// Rows from one bit of a key to the next of the same joint: fourth differences of white noise that far apart have correlation −0.11.
-const SPACING: usize = 3;
+pub(super) const SPACING: usize = 3;
 /// Samples of a fourth difference.
 const SPAN: usize = 5;
 

@@ -103,6 +103,8 @@ pub struct Look {
     pub joints: Vec<JointCheck>,
     /// How the base stands, where that explains more than the model's gravity.
     pub base: Option<Base>,
+    /// Joints whose torque has the model's shape and another size: measured over the model's. Without a name it is that of all joints.
+    pub sizes: Vec<(Option<String>, f64)>,
     /// Those of [`self_check`].
     pub findings: Vec<Finding>,
 }
@@ -150,6 +152,7 @@ pub fn look<'a>(
         findings.extend(lacking);
     }
     let joints = joint_checks(robot, &as_logged, &read.reading, &scales);
+    let sizes = scales.iter().filter_map(Scale::size).collect();
     findings.extend(scales.into_iter().map(|scale| scale.finding));
     if findings.is_empty() && sample.independent >= LEAST_INDEPENDENT {
         let factors = Factors::of(robot, &sample, &Parts::of(robot, &sample));
@@ -158,6 +161,7 @@ pub fn look<'a>(
     Ok(Look {
         joints,
         base: read.base,
+        sizes,
         findings,
     })
 }
@@ -306,7 +310,7 @@ fn scales(robot: &Robot, sample: &Sample, explained: &[Option<Explained>]) -> Ve
             "torque is about 1000 times the model's on every joint on which the model tells ({}): looks like N·mm for N·m",
             joints.join(", ")
         );
-        return vec![Scale::new(None, problem, Some(THOUSANDTH))];
+        return vec![Scale::new(None, problem, Some(THOUSANDTH)).times(Some(1.0 / THOUSANDTH))];
     }
     let efforts = efforts(robot, sample);
     if told.is_empty() && all_beyond_effort(&efforts) {
@@ -352,7 +356,7 @@ fn scales(robot: &Robot, sample: &Sample, explained: &[Option<Explained>]) -> Ve
                 None => continue,
             },
         };
-        scales.push(Scale::new(Some(name), problem, factor));
+        scales.push(Scale::new(Some(name), problem, factor).times(gain));
     }
     if let Some(times) = far_off(explained).filter(|_| scales.is_empty()) {
         let size = match times > 1.0 {
@@ -363,7 +367,7 @@ fn scales(robot: &Robot, sample: &Sample, explained: &[Option<Explained>]) -> Ve
             "torque of all joints together is {size} the model's: looks like another unit or side (N·mm, currents, the motor's side), or \
              another robot"
         );
-        scales.push(Scale::new(None, problem, None));
+        scales.push(Scale::new(None, problem, None).times(Some(times)));
     }
     scales
 }
@@ -391,9 +395,22 @@ struct Scale {
     finding: Finding,
     /// What makes N·m of it where it is a thousandth.
     factor: Option<f64>,
+    /// Measured over the model's, where the torque has its shape.
+    times: Option<f64>,
 }
 
 impl Scale {
+    fn times(self, times: Option<f64>) -> Self {
+        Self { times, ..self }
+    }
+
+    /// See [`Look::sizes`].
+    fn size(&self) -> Option<(Option<String>, f64)> {
+        let joint = &self.finding.subject;
+        let joint = (!joint.is_empty()).then(|| joint.clone());
+        self.times.map(|times| (joint, times))
+    }
+
     fn new(joint: Option<&str>, problem: String, factor: Option<f64>) -> Self {
         let whose = joint.map_or_else(String::new, |name| format!("joint `{name}`: "));
         let (subject, columns) = match joint {
@@ -411,6 +428,7 @@ impl Scale {
                 0,
             ),
             factor,
+            times: None,
         }
     }
 }

@@ -241,14 +241,18 @@ impl Moments {
 /// Of chapters that cannot be read.
 pub fn hardly_driven<'a>(robot: &Robot, logs: impl Into<Logs<'a>>) -> Result<Vec<Finding>> {
     let Logs(logs) = logs.into();
+    let sized = |log: &Log<'_>| Ok((log.name().to_owned(), torque_rms(log)?));
+    let sizes: Vec<(String, Vec<Option<f64>>)> = logs.iter().map(sized).collect::<Result<_>>()?;
+    Ok(less_driven(robot, &sizes))
+}
+
+/// [`hardly_driven`] from the names of the logs and the root mean square of each joint's torque.
+pub(crate) fn less_driven(robot: &Robot, logs: &[(String, Vec<Option<f64>>)]) -> Vec<Finding> {
     let mut findings = Vec::new();
-    if logs.len() < 2 {
-        return Ok(findings);
-    }
-    let torques: Vec<Vec<Option<f64>>> = logs.iter().map(torque_rms).collect::<Result<_>>()?;
     for (joint, name) in robot.joint_names().into_iter().enumerate() {
-        let largest = (torques.iter().filter_map(|log| log[joint])).fold(0.0, f64::max);
-        for (log, torque) in logs.iter().zip(&torques) {
+        let torques = logs.iter().filter_map(|(_, torque)| torque[joint]);
+        let largest = torques.fold(0.0, f64::max);
+        for (log, torque) in logs {
             let Some(torque) = torque[joint].filter(|t| *t < HARDLY_DRIVEN * largest) else {
                 continue;
             };
@@ -258,14 +262,14 @@ pub fn hardly_driven<'a>(robot: &Robot, logs: impl Into<Logs<'a>>) -> Result<Vec
                 100.0 * torque / largest
             );
             let (severity, code) = (Severity::Note, Code::JointNotDriven);
-            findings.push(Finding::new(severity, code, log.name(), message, 0).of_joint(name));
+            findings.push(Finding::new(severity, code, log, message, 0).of_joint(name));
         }
     }
-    Ok(findings)
+    findings
 }
 
 /// Root mean square of each joint's finite torques; `None` without any.
-fn torque_rms(log: &Log<'_>) -> Result<Vec<Option<f64>>> {
+pub(crate) fn torque_rms(log: &Log<'_>) -> Result<Vec<Option<f64>>> {
     let mut sums: Vec<(f64, usize)> = Vec::new();
     log.until(|recording| {
         sums.resize(recording.joints.len(), (0.0, 0));

@@ -26,6 +26,7 @@ mod recording;
 mod repeats;
 mod saturation;
 mod shelf;
+mod sound;
 mod spectrum;
 pub(crate) mod spline;
 mod standstill;
@@ -46,6 +47,7 @@ pub use choose::Chosen;
 pub(crate) use clock::median_step;
 pub use correct::{Corrections, Lag};
 pub use describe::{JointOverview, LogOverview, describe, hardly_driven};
+pub(crate) use describe::{less_driven, torque_rms};
 pub(crate) use few_chapters::FewChapters;
 pub use history::{JointHistory, Warmth};
 pub(crate) use history::{

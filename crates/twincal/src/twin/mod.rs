@@ -17,7 +17,7 @@ use crate::error::{Error, Finding, Result};
 use crate::likelihood::JointNoise;
 use crate::posterior::Posterior;
 use crate::robot::{JointKind, Robot};
-use crate::signal::{JointHistory, Payload, Pipeline, Recording, Trajectory, align_part};
+use crate::signal::{Payload, Pipeline, Recording, Trajectory, align_part};
 use crate::term::{Family, Library, LibrarySettings};
 use serde::{Deserialize, Serialize};
 
@@ -175,15 +175,12 @@ impl Twin {
                 remedy: "the twin's file is damaged or from another version: fit again".into(),
             });
         }
-        let history = &self.pipeline.history;
-        if !(history.is_empty() || history.len() == names.len())
-            || !history.iter().all(JointHistory::is_sound)
-        {
+        if !self.pipeline.has_sound_history(names.len()) {
             return Err(Error::Setting {
                 key: "twin".into(),
                 problem: format!(
                     "what it follows of the history of {} joints is not consistent",
-                    history.len()
+                    self.pipeline.history.len()
                 ),
                 remedy: "the twin's file is damaged or from another version: fit again".into(),
             });

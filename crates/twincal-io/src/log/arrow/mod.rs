@@ -14,7 +14,7 @@ use arrow_ipc::{
     root_as_footer, root_as_message,
 };
 use layout::{Form, Numbers, Position};
-pub(crate) use rows::{Row, Rows, fits};
+pub(crate) use rows::{ANEW, Row, Rows, fits};
 use std::io::{self, Read, Seek, SeekFrom};
 use twincal::signal::Log as GivenLog;
 use twincal::{Code, Finding, Severity};
@@ -32,7 +32,7 @@ pub(super) fn read(
     request: Request<'_>,
 ) -> Result<(GivenLog<'static>, Vec<Finding>)> {
     let name = request.name;
-    let mut log = Log::open(source, name)?;
+    let mut log = Log::open(source, name, EXPORT)?;
     let selection = request.select(&log.header()?)?;
     let wanted = selection.file_columns();
     let mut findings = Vec::new();
@@ -69,7 +69,7 @@ pub(super) fn read(
 
 /// Column names of an Arrow IPC file or stream.
 pub(super) fn header(source: impl Read + Seek, name: &str) -> Result<Vec<String>> {
-    Log::open(source, name)?.header()
+    Log::open(source, name, EXPORT)?.header()
 }
 
 /// An input error in words.
@@ -80,11 +80,16 @@ fn reason(error: &io::Error) -> String {
     }
 }
 
+/// What helps where a log is damaged.
+const EXPORT: &str = "copy or export it again";
+
 /// A file or stream whose schema has been read.
 #[derive(Debug)]
 struct Log<R> {
     source: R,
     name: String,
+    /// What helps where the file is damaged.
+    remedy: &'static str,
     length: u64,
     /// Footer of a file, first message of a stream.
     metadata: Vec<u8>,
@@ -129,12 +134,13 @@ struct Message {
 }
 
 impl<R: Read + Seek> Log<R> {
-    fn open(mut source: R, name: &str) -> Result<Self> {
+    fn open(mut source: R, name: &str, remedy: &'static str) -> Result<Self> {
         let system = |e: &io::Error| Error::system(name, "read", e, "check the disk");
         let length = source.seek(SeekFrom::End(0)).map_err(|e| system(&e))?;
         let mut log = Self {
             source,
             name: name.to_owned(),
+            remedy,
             length,
             metadata: Vec::new(),
             is_file: false,
@@ -158,7 +164,7 @@ impl<R: Read + Seek> Log<R> {
     }
 
     fn refuse(&self, problem: String) -> Error {
-        Error::content(Place::file(&self.name), problem, "copy or export it again")
+        Error::content(Place::file(&self.name), problem, self.remedy)
     }
 
     fn broken(&self, at: u64) -> Error {

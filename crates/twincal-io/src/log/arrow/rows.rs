@@ -15,6 +15,8 @@ const LIST: [usize; 2] = [4, 6];
 /// Bytes of a footer for each record batch, and for what is not metadata.
 const PER_BATCH: u64 = 24;
 const FRAME: u64 = 4096;
+/// What helps where a file is not as it was written.
+pub(crate) const ANEW: &str = "make it anew with `twincal statistics --force`";
 /// Numbers of a row that are read without asking for memory, bytes.
 const SMALL: u64 = 16 << 20;
 
@@ -52,7 +54,7 @@ impl<R: Read + Seek> Rows<R> {
                 "give a file that `twincal statistics` wrote",
             ));
         }
-        let log = Log::open(source, name)?;
+        let log = Log::open(source, name, ANEW)?;
         if !log.batches.is_sorted_by(|one, next| one < next) {
             return Err(log.refuse("names a record batch twice, or not in their order".into()));
         }
@@ -66,6 +68,7 @@ impl<R: Read + Seek> Rows<R> {
         let log = Log {
             source,
             name: name.to_owned(),
+            remedy: ANEW,
             length,
             metadata: Vec::new(),
             is_file: true,

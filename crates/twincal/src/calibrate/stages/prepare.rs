@@ -19,6 +19,8 @@ pub(in crate::calibrate) struct Prepared<'a, 'r> {
     /// Logs to fit.
     pub(in crate::calibrate) ready: Vec<ReadyLog<'a>>,
     pub(in crate::calibrate) pipeline: Pipeline,
+    /// What was found while it was chosen.
+    pub(in crate::calibrate) of_pipeline: Vec<Finding>,
     /// See [`crate::signal::Chosen::wider_hz`].
     pub(in crate::calibrate) wider_hz: Option<f64>,
     pub(in crate::calibrate) lags: Option<Lags>,
@@ -52,13 +54,16 @@ pub(in crate::calibrate) fn prepare<'a, 'r>(
     }
     let chosen = choose_and_prepare(robot, recorded.fit, &settings.signal)?;
     let (mut pipeline, mut ready) = (chosen.pipeline, chosen.logs);
-    findings.extend(chosen.findings);
+    let mut of_pipeline = chosen.findings;
+    findings.extend(of_pipeline.iter().cloned());
     let every_log: Vec<Log<'_>> = recorded.all().map(Log::lent).collect();
     findings.extend(constant_torque(robot, every_log.clone())?);
     findings.extend(hardly_driven(robot, every_log)?);
     let lags = aligned::align(robot, recorded.fit, &mut pipeline, &mut ready, findings)?;
     let logs = (recorded.fit, &ready[..]);
+    let known = findings.len();
     let followed = history::follow(robot, logs, &pipeline, settings, findings)?;
+    of_pipeline.extend(findings.iter().skip(known).cloned());
     pipeline.history = followed.history;
     let library_settings = LibrarySettings {
         coulomb_velocity: pipeline.coulomb_velocity,
@@ -71,6 +76,7 @@ pub(in crate::calibrate) fn prepare<'a, 'r>(
         recorded,
         ready,
         pipeline,
+        of_pipeline,
         wider_hz: chosen.wider_hz,
         lags,
         usual: smaller_library::is_usual(&settings.library.families),
@@ -94,6 +100,7 @@ impl<'r> Prepared<'_, 'r> {
             turned.prepare_again(robot, logs, &self.pipeline, &mut self.ready)?;
             self.library_settings.coulomb_velocity = turned.pipeline.coulomb_velocity;
             (self.pipeline, self.library) = (turned.pipeline, turned.library);
+            self.of_pipeline.push(turned.finding.clone());
             findings.push(turned.finding);
         }
         Ok(())
@@ -107,6 +114,7 @@ impl<'r> Prepared<'_, 'r> {
             recorded: Recorded::NONE,
             ready: ready.collect(),
             pipeline: self.pipeline,
+            of_pipeline: self.of_pipeline,
             wider_hz: self.wider_hz,
             lags: self.lags,
             settings: self.settings,

@@ -1,6 +1,7 @@
 //! Copies are found, recordings of one programme are not.
 
 use super::*;
+use crate::cross_check::{Sketch, sketched_copies};
 use crate::random::Random;
 use crate::signal::{Channels, Payload};
 
@@ -132,4 +133,56 @@ fn a_copy_among_many_logs_is_found() {
     let said = found(&runs);
     assert_eq!(said.len(), 1, "{said:?}");
     assert!(said[0].message.contains("`run17`"));
+}
+
+/// What sketches of the logs say, without the logs.
+fn sketched(recordings: &[Recording]) -> Vec<Finding> {
+    let sketch = |own: &Recording| Sketch::of(&Log::from(own), 3).unwrap();
+    let sketches: Vec<Sketch> = recordings.iter().map(sketch).collect();
+    let names = recordings.iter().map(|own| own.name.as_str());
+    sketched_copies(&names.zip(&sketches).collect::<Vec<_>>())
+}
+
+#[test]
+fn sketches_find_copies_that_are_shifted_cut_or_rounded() {
+    let run = recording(1, 1, 6000);
+    let other = recording(2, 2, 6000);
+    for copy in [
+        cut(&run, 0..6000, |tau, _| tau),
+        cut(&run, 37..6000, |tau, _| tau),
+        cut(&run, 5000..5800, |tau, _| tau),
+        cut(&run, 300..1200, |tau, _| (tau * 100.0).round() / 100.0),
+    ] {
+        let said = sketched(&[run.clone(), other.clone(), copy.clone()]);
+        assert_eq!(said.len(), 1, "{said:?}");
+        assert_eq!(said[0].subject, "copy");
+        assert_eq!(said[0].severity, Severity::Degraded);
+        assert!(said[0].message.contains("`run1`"), "{}", said[0].message);
+        assert_eq!(sketched(&[copy, other.clone(), run.clone()]).len(), 1);
+    }
+}
+
+/// A pattern of independent noise is in both logs with probability 2⁻³² per pair of rows, and sixteen of a joint have to be.
+#[test]
+fn sketches_of_recordings_say_nothing() {
+    let runs: Vec<Recording> = (0..20).map(|take| recording(7, take, 3000)).collect();
+    assert_eq!(sketched(&runs), []);
+    let smooth = |programme| {
+        let mut smooth = recording(programme, programme, 3000);
+        for channels in &mut smooth.joints {
+            channels.tau = Some(channels.q.iter().map(|q| 20.0 * q).collect());
+        }
+        smooth
+    };
+    assert_eq!(sketched(&[smooth(1), smooth(2), smooth(3)]), []);
+    let rippled = |programme| {
+        let mut rippled = smooth(programme);
+        for channels in &mut rippled.joints {
+            let all = channels.tau.iter_mut().flatten().enumerate();
+            all.for_each(|(row, tau)| *tau += [0.3, -0.1, 0.5, -0.7][row % 4]);
+        }
+        rippled
+    };
+    assert_eq!(sketched(&[rippled(1), rippled(2)]), []);
+    assert_eq!(sketched(&[]), []);
 }

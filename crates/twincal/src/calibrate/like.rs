@@ -1,0 +1,164 @@
+//! Whether the torque of several logs has one unit, by its size in their statistics.
+
+use super::log_statistics::{LogStatistics, Statistics};
+use crate::error::{Error, Result};
+use crate::words::significant;
+
+/// Factor between the torque of a log and that of the others which no motion makes on all joints.
+const ODD: f64 = 30.0;
+/// The same on one joint: it moves in all of these logs, so that friction is in its torque.
+const ODD_JOINT: f64 = 1000.0;
+/// Share of the rows in which a joint moves, from which its torque is compared.
+const MOVES: f64 = 0.1;
+
+/// Size of each joint's torque in a log.
+struct Sizes<'a> {
+    log: &'a str,
+    /// Root mean square, N·m or N; `None` for a joint that hardly moves.
+    rms: Vec<Option<f64>>,
+}
+
+/// Torque that the other logs contradict.
+struct Odd {
+    times: f64,
+    /// Of all joints where there is none.
+    joint: Option<usize>,
+}
+
+impl<'a> Sizes<'a> {
+    fn of(log: &'a LogStatistics) -> Self {
+        let rows = log.sums.rows.iter().sum::<usize>() as f64;
+        let joints = log.sums.joints.iter().zip(log.torque_rms());
+        let rms = joints.map(|(joint, rms)| {
+            let moving: f64 = joint.blocks.iter().map(|own| own.gram.n).sum();
+            rms.filter(|rms| moving > MOVES * rows && *rms > 0.0)
+        });
+        Self {
+            log: log.name(),
+            rms: rms.collect(),
+        }
+    }
+
+    /// What is odd against the median of all logs, or the other one of two.
+    fn odd(&self, all: &[Sizes<'_>]) -> Option<Odd> {
+        let pair = all.len() == 2;
+        let ratio = |joint: usize| {
+            let own = self.rms[joint]?;
+            let others = all.iter().filter(|other| !pair || other.log != self.log);
+            let mut sizes: Vec<f64> = others.filter_map(|other| other.rms[joint]).collect();
+            sizes.sort_by(f64::total_cmp);
+            let usual = sizes.get(sizes.len() / 2)?;
+            Some((joint, own / usual))
+        };
+        let ratios: Vec<(usize, f64)> = (0..self.rms.len()).filter_map(ratio).collect();
+        // The larger one of two is named.
+        let beyond = |ratio: f64, limit: f64| ratio > limit || !pair && ratio < 1.0 / limit;
+        let one_way = |large: bool| ratios.iter().all(|(_, ratio)| (*ratio > 1.0) == large);
+        let all_odd = ratios.iter().all(|(_, ratio)| beyond(*ratio, ODD));
+        if !ratios.is_empty() && all_odd && (one_way(true) || one_way(false)) {
+            let mean =
+                ratios.iter().map(|(_, ratio)| ratio.ln()).sum::<f64>() / ratios.len() as f64;
+            return Some(Odd {
+                times: mean.exp(),
+                joint: None,
+            });
+        }
+        let odd = ratios
+            .into_iter()
+            .find(|(_, ratio)| beyond(*ratio, ODD_JOINT));
+        odd.map(|(joint, times)| Odd {
+            times,
+            joint: Some(joint),
+        })
+    }
+}
+
+/// # Errors
+/// [`Error::Statistics`] without logs, and for a log whose torque is of another size than that of the others, on every joint that moves or on one.
+pub(super) fn require_like(statistics: &Statistics) -> Result<()> {
+    let all: Vec<Sizes<'_>> = statistics.logs.iter().map(Sizes::of).collect();
+    let (problem, remedy) = if all.is_empty() {
+        let remedy = "give statistics of one log at least";
+        ("no log".to_owned(), remedy)
+    } else if let Some(problem) = problem(&all, &statistics.robot.joint_names()) {
+        let remedy = "leave the log out, or make its statistics with its unit of torque";
+        (problem, remedy)
+    } else {
+        return Ok(());
+    };
+    Err(Error::Statistics {
+        problem,
+        remedy: remedy.into(),
+    })
+}
+
+/// The first log whose torque is odd, and against what.
+fn problem(all: &[Sizes<'_>], joints: &[&str]) -> Option<String> {
+    let (own, odd) = all.iter().find_map(|own| Some((own, own.odd(all)?)))?;
+    let others = match all {
+        [one, other] => format!(
+            "log `{}`",
+            if one.log == own.log {
+                other.log
+            } else {
+                one.log
+            }
+        ),
+        _ => "the others".into(),
+    };
+    let joints = odd.joint.map(|joint| format!("joint `{}`", joints[joint]));
+    Some(format!(
+        "the torque of log `{}` is {} times that of {others} on {}",
+        own.log,
+        significant(odd.times, 2),
+        joints.as_deref().unwrap_or("every joint")
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[track_caller]
+    fn said(logs: &[[f64; 2]], wanted: Option<&str>) {
+        let names = ["a", "b", "c", "d"];
+        let sizes = |(log, rms): (&'static str, &[f64; 2])| Sizes {
+            log,
+            rms: rms.iter().map(|rms| (*rms > 0.0).then_some(*rms)).collect(),
+        };
+        let all: Vec<Sizes<'_>> = names.into_iter().zip(logs).map(sizes).collect();
+        assert_eq!(problem(&all, &["hip", "knee"]).as_deref(), wanted);
+    }
+
+    #[test]
+    fn one_of_two_logs_with_another_unit_is_named_with_the_other() {
+        let wanted = "the torque of log `b` is 1.0e6 times that of log `a` on every joint";
+        said(&[[3.0, 2.0], [3e6, 2e6]], Some(wanted));
+        let wanted = "the torque of log `a` is 1.0e6 times that of log `b` on every joint";
+        said(&[[3e6, 2e6], [3.0, 2.0]], Some(wanted));
+        let wanted = "the torque of log `b` is 2.0e4 times that of log `a` on joint `knee`";
+        said(&[[3.0, 2.0], [4.0, 4e4]], Some(wanted));
+        said(&[[3.0, 2.0], [60.0, 80.0]], None);
+    }
+
+    #[test]
+    fn one_of_several_logs_is_named_and_the_joint_where_it_is_one() {
+        let usual = [[3.0, 2.0], [4.0, 1.0]];
+        let with = |own: [f64; 2]| [&usual[..], &[own]].concat();
+        let wanted = "the torque of log `c` is 40 times that of the others on every joint";
+        said(&with([160.0, 80.0]), Some(wanted));
+        let wanted = "the torque of log `c` is 1.0e-6 times that of the others on joint `hip`";
+        said(&with([3e-6, 1.0]), Some(wanted));
+        let wanted = "the torque of log `c` is 1.5e6 times that of the others on joint `knee`";
+        said(&with([3.0, 3e6]), Some(wanted));
+    }
+
+    /// A heavy load, a joint that stands still, and logs of which none has the torque of another.
+    #[test]
+    fn other_motion_is_no_other_unit() {
+        said(&[[3.0, 2.0]], None);
+        said(&[[3.0, 2.0], [3.0, 400.0], [4.0, 1.0]], None);
+        said(&[[3.0, 0.0], [0.0, 400.0], [4.0, 0.0]], None);
+        said(&[[3.0, 0.0], [0.0, 400.0]], None);
+    }
+}
