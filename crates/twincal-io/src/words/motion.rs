@@ -62,12 +62,17 @@ mod tests {
     use super::*;
     use crate::context::ReportContext;
     use crate::report::{fixture, render};
+    use std::collections::BTreeMap;
+    use twincal::assess::{RequestCode, assess};
+    use twincal::calibrate::{Alike, Group};
+    use twincal::robot::Robot;
+    use twincal::{Code, Finding, Severity};
 
     #[test]
     fn the_command_names_the_folder_and_what_it_decides() {
         let open = fixture::with_open_effects();
         let motion = next_motion(&open, "out").expect("open effects");
-        assert_eq!(motion.command, "twincal design --twin out -o motion");
+        assert!(motion.command.starts_with("twincal design --twin out"));
         assert!(motion.sentence().starts_with(&motion.command));
         let mut closed = open;
         closed.problem = None;
@@ -75,11 +80,71 @@ mod tests {
     }
 
     #[test]
+    fn what_is_open_is_asked_for_only_where_a_motion_can_decide_it() {
+        let mut own = fixture::with_open_effects();
+        let pips = [0.04, 0.05, 0.5, 0.9, 0.94, 0.95];
+        assert!(own.components.len() >= pips.len());
+        own.components.truncate(pips.len());
+        for (component, pip) in own.components.iter_mut().zip(pips) {
+            component.pip = Some(pip);
+        }
+        let name = |at: usize| own.components[at].name.clone();
+        let decides = |own: &Calibration| next_motion(own, "out").map(|motion| motion.decides);
+        let three = format!("{}, {}, {} and 1 more", name(1), name(2), name(3));
+        assert_eq!(decides(&own), Some(three));
+        let asked = assess(&own).next;
+        let asked = asked
+            .iter()
+            .map(|own| (own.code, own.subject.name().to_owned()));
+        let designed = |at: &usize| (RequestCode::DesignedMotion, name(*at));
+        assert!(asked.eq([1, 2, 3, 4].iter().map(designed)));
+        let mut structural = own.clone();
+        structural.groups.push(Group {
+            members: [1, 2, 3, 4].map(name).to_vec(),
+            pip: 0.9,
+            alike: Alike::EveryMotion,
+            settled: false,
+            words: String::new(),
+        });
+        assert_eq!(decides(&structural), None, "no motion decides");
+        let mut doubtful = own.clone();
+        let code = Code::SignFlip;
+        doubtful.findings = vec![Finding::new(Severity::Warning, code, "log", "", 1)];
+        assert_eq!(decides(&doubtful), None, "a doubtful log");
+        for component in &mut own.components {
+            component.pip = Some(0.99);
+        }
+        assert_eq!(decides(&own), None, "nothing open");
+    }
+
+    /// A model without velocity limits needs a file of limits.
+    #[test]
+    fn the_command_has_a_file_of_limits_where_the_model_has_none() {
+        let with = |velocity: Option<f64>| {
+            let mut own = fixture::with_open_effects();
+            let mut description = own.twin.robot.description().clone();
+            for joint in &mut description.joints {
+                joint.limits.velocity = velocity;
+            }
+            own.twin.robot = Robot::new(description, &BTreeMap::new())
+                .expect("a robot")
+                .0;
+            next_motion(&own, "out").expect("open effects").command
+        };
+        assert_eq!(with(Some(2.0)), "twincal design --twin out -o motion");
+        let stated = "twincal design --twin out --limits limits.toml -o motion";
+        assert_eq!([with(None), with(Some(0.0))], [stated; 2]);
+    }
+
+    #[test]
     fn a_page_shows_the_command_as_code_in_its_own_case() {
         let open = fixture::with_open_effects();
         let html = render(&open, &ReportContext::default()).expect("a page");
-        let code = "<code>twincal design --twin DIR -o motion</code> designs a motion to decide";
-        assert!(html.contains(code));
+        let command = next_motion(&open, PAGE_FOLDER)
+            .expect("open effects")
+            .command;
+        let code = format!("<code>{command}</code> designs a motion to decide");
+        assert!(html.contains(&code));
         assert!(html.contains("DIR is the folder of this page."));
         assert!(!html.contains(&format!("<p class=\"next\">{code}")));
     }
