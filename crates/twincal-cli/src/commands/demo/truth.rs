@@ -12,6 +12,8 @@ use twincal_io::words::probability;
 const TRUTH: &str = include_str!("../../../../../studies/planar_arm/assets/truth.json");
 /// Distance of a number from the truth, in spreads, that is said.
 const FAR: f64 = 3.0;
+/// Columns before what was found.
+const FOUND: usize = 34;
 
 /// The file: coefficients of the Lagrangian and friction by name, and the arm that was simulated.
 #[derive(Deserialize)]
@@ -129,6 +131,10 @@ pub(super) fn beside(calibration: &Calibration, width: usize) -> Outcome<Vec<Str
         missed += usize::from(is_missed);
         let true_value = significant(truth.value, 3);
         lines.push(format!("  {:<22}{true_value:>8}  {found}", truth.words));
+        let set = component.filter(|_| !is_missed).and_then(in_a_set);
+        let set = crate::commands::wrapped(&set.unwrap_or_default(), width - FOUND);
+        let set = set.iter().filter(|line| !line.is_empty());
+        lines.extend(set.map(|line| format!("{:FOUND$}{line}", "")));
     }
     let others: Vec<&str> = (calibration.components.iter())
         .filter(|own| own.status == Status::Established)
@@ -159,10 +165,7 @@ fn found(truth: &Truth, component: Option<&ComponentSummary>) -> (String, bool) 
             .cloned()
     };
     match component.filter(claimed).and_then(parameter) {
-        Some(own) => {
-            let set = component.and_then(in_a_set).unwrap_or_default();
-            (format!("{}{set}", with_distance(&own, truth.value)), false)
-        }
+        Some(own) => (with_distance(&own, truth.value), false),
         None => {
             let pip = component.and_then(|own| own.pip);
             let probability = probability(pip.unwrap_or(f64::NAN));
@@ -171,14 +174,14 @@ fn found(truth: &Truth, component: Option<&ComponentSummary>) -> (String, bool) 
     }
 }
 
-/// ", in a set with elbow.offset": at least one of the set is in, and which one is open.
+/// "in a set with elbow.offset": at least one of the set is in, and which one is open.
 fn in_a_set(component: &ComponentSummary) -> Option<String> {
     let StatusReason::SameTorque { members, .. } = &component.reason else {
         return None;
     };
     let others = members.iter().filter(|name| **name != component.name);
     let others: Vec<&str> = others.map(String::as_str).collect();
-    Some(format!(", in a set with {}", others.join(", ")))
+    Some(format!("in a set with {}", others.join(", ")))
 }
 
 /// "+0.3988 ± 0.0021 N·m·s/rad", with its distance from the truth where that is large.
@@ -241,8 +244,9 @@ mod tests {
             pip: 0.99,
             alike: Alike::TheseLogs,
         };
-        let set = format!("{value}, in a set with elbow.offset");
-        assert_eq!(of(Status::Equivalent, same), (set, false));
+        let set = in_a_set(&tilt(Status::Equivalent, same.clone()));
+        assert_eq!(set.as_deref(), Some("in a set with elbow.offset"));
+        assert_eq!(of(Status::Equivalent, same), (value.into(), false));
         let missed = of(Status::Tentative, StatusReason::Probability);
         assert_eq!(missed, ("missed (PIP 0.310)".into(), true));
         assert_eq!(found(&truth, None), ("missed (PIP –)".into(), true));
