@@ -26,6 +26,7 @@
 mod answer;
 mod beyond;
 mod claim;
+mod decide;
 mod intervals;
 mod next;
 mod of_torque;
@@ -33,8 +34,9 @@ mod rest;
 mod scores;
 mod shape;
 
-pub use answer::{Answer, decide, decision_table};
+pub use answer::{Answer, decision_table};
 pub use claim::{Claim, Evidence, Role, Subject};
+pub use decide::decide;
 pub use next::{Request, RequestCode, open_effects};
 pub use rest::{AtRest, Pauses, all_at_rest, at_rest, few_pauses, standstill};
 pub use scores::{

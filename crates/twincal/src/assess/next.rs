@@ -1,5 +1,6 @@
 //! The recording to make next: what it has to hold so that this data's open questions get an answer.
 
+use super::answer::Answer;
 use super::beyond;
 use super::claim::{Claim, Evidence, Role, Subject};
 use super::rest::hardly_at_rest;
@@ -49,7 +50,7 @@ pub enum RequestCode {
 /// What would show more. A log that is no measurement of this model has to be corrected first: then nothing is asked for.
 pub(super) fn requests(calibration: &Calibration, claims: &[Claim]) -> Vec<Request> {
     let is_mistake = |claim: &&Claim| {
-        claim.role == Role::ForbidsYes && super::Answer::of_result(claim.code).is_none()
+        claim.role == Role::ForbidsYes && Answer::of_result(claim.code).is_none()
     };
     if claims.iter().any(|claim| is_mistake(&claim)) {
         return Vec::new();

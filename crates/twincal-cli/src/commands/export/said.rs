@@ -68,8 +68,8 @@ pub(super) fn change(change: &WriteBack, holds: Holds, terminal: &mut Terminal) 
     terminal.heading(&format!("In the {format} now"));
     if let Some(projection) = &change.projection {
         let text = format!(
-            "warning: no body can have the inertia found for {}: the one with the nearest torque was taken; do not read it as mass or \
-             inertia (a comment in the file says so, too)",
+            "warning: the mean of what was found for {} is physically inconsistent: the body with the nearest torque was taken; read mass \
+             and inertia from the twin, not from the file (a comment in the file says so, too)",
             projection.links.join(", ")
         );
         warn(&text, terminal);
@@ -187,7 +187,7 @@ fn change_of(change: &LinkChange) -> Option<String> {
         text += ", new inertia tensor";
     }
     if change.no_body {
-        text += "; no body can have what was found";
+        text += "; the body nearest to what was found";
     }
     Some(text)
 }
