@@ -404,6 +404,7 @@ fn odd_numbers_in_a_plan_are_refused() {
         ("motion_interval", "0"),
         ("motion_interval", "1e-9"),
         ("velocity_from", "[]"),
+        ("corrections", "[]"),
         ("history", "[]"),
     ];
     assert_eq!(taken, harmless);
@@ -431,7 +432,7 @@ fn torque_of_another_unit_is_refused_with_its_log() {
     let study = study(1);
     let plan = study.plan();
     for (joints, words) in [
-        (0..2, "is 1000"),
+        (0..2, "the torque of joint `shoulder` is"),
         (0..1, "the torque of joint `shoulder` is"),
         (1..2, "the torque of joint `elbow` is"),
     ] {

@@ -6,8 +6,8 @@ use super::{Pipeline, fir, prepare};
 use crate::robot::Robot;
 use std::fmt::Debug;
 
-/// Longest kernel, s: a day.
-const LONGEST_KERNEL: f64 = 86_400.0;
+/// Longest kernel, and longest time between rows, s: a day.
+const LONGEST: f64 = 86_400.0;
 /// Highest rate of kept rows, Hz.
 const HIGHEST_RATE: f64 = 1e6;
 /// What rounding may add to a ratio.
@@ -59,7 +59,7 @@ impl Pipeline {
 
     fn has_sound_cutoff(&self) -> bool {
         let kernel = || 2.0 * fir::column_half_seconds(self.cutoff_hz);
-        self.is_off() || self.cutoff_hz > 0.0 && kernel() <= LONGEST_KERNEL
+        self.is_off() || self.cutoff_hz > 0.0 && kernel() <= LONGEST
     }
 
     /// The motion filter is at least as wide as that of the columns, at most four times; a log that holds its kernel holds both.
@@ -72,7 +72,8 @@ impl Pipeline {
     }
 
     fn has_sound_rate(&self) -> bool {
-        (0.0..=HIGHEST_RATE).contains(&self.rate_hz) && (self.is_off() || self.rate_hz > 0.0)
+        let lowest = if self.is_off() { 0.0 } else { 1.0 / LONGEST };
+        (lowest..=HIGHEST_RATE).contains(&self.rate_hz)
     }
 
     /// The clock of the motion is no coarser than that of a motion which never reverses.
