@@ -108,7 +108,10 @@ fn no_files_of_a_module_use_each_other_in_a_circle() {
     let with_circles: Vec<&str> = (order.iter().map(String::as_str))
         .filter(|module| circle(&without_ancestors(arrows_of(module))).is_some())
         .collect();
-    assert_eq!(with_circles, CIRCLES, "a module is in circles or out of them");
+    assert_eq!(
+        with_circles, CIRCLES,
+        "a module is in circles or out of them"
+    );
 }
 
 #[test]

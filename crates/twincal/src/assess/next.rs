@@ -49,9 +49,8 @@ pub enum RequestCode {
 
 /// What would show more. A log that is no measurement of this model has to be corrected first: then nothing is asked for.
 pub(super) fn requests(calibration: &Calibration, claims: &[Claim]) -> Vec<Request> {
-    let is_mistake = |claim: &&Claim| {
-        claim.role == Role::ForbidsYes && Answer::of_result(claim.code).is_none()
-    };
+    let is_mistake =
+        |claim: &&Claim| claim.role == Role::ForbidsYes && Answer::of_result(claim.code).is_none();
     if claims.iter().any(|claim| is_mistake(&claim)) {
         return Vec::new();
     }
