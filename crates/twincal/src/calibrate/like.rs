@@ -39,17 +39,9 @@ impl<'a> Sizes<'a> {
         }
     }
 
-    /// What is odd against the median of all logs, or the other one of two.
-    fn odd(&self, all: &[Sizes<'_>]) -> Option<Odd> {
-        let pair = all.len() == 2;
-        let ratio = |joint: usize| {
-            let own = self.rms[joint]?;
-            let others = all.iter().filter(|other| !pair || other.log != self.log);
-            let mut sizes: Vec<f64> = others.filter_map(|other| other.rms[joint]).collect();
-            sizes.sort_by(f64::total_cmp);
-            let usual = sizes.get(sizes.len() / 2)?;
-            Some((joint, own / usual))
-        };
+    /// What is odd against the usual torque of each joint: the median of all logs, or that of the other one of a `pair`.
+    fn odd(&self, usual: &[Option<f64>], pair: bool) -> Option<Odd> {
+        let ratio = |joint: usize| Some((joint, self.rms[joint]? / usual[joint]?));
         let ratios: Vec<(usize, f64)> = (0..self.rms.len()).filter_map(ratio).collect();
         // The larger one of two is named.
         let beyond = |ratio: f64, limit: f64| ratio > limit || !pair && ratio < 1.0 / limit;
@@ -92,9 +84,28 @@ pub(super) fn require_like(statistics: &Statistics) -> Result<()> {
     })
 }
 
+/// Median of each joint's torque over all logs.
+fn medians(all: &[Sizes<'_>], joints: usize) -> Vec<Option<f64>> {
+    let median = |joint: usize| {
+        let mut sizes: Vec<f64> = all.iter().filter_map(|own| own.rms[joint]).collect();
+        sizes.sort_by(f64::total_cmp);
+        sizes.get(sizes.len() / 2).copied()
+    };
+    (0..joints).map(median).collect()
+}
+
 /// The first log whose torque is odd, and against what.
 fn problem(all: &[Sizes<'_>], joints: &[&str]) -> Option<String> {
-    let (own, odd) = all.iter().find_map(|own| Some((own, own.odd(all)?)))?;
+    let (own, odd) = match all {
+        [one, other] => [(one, other), (other, one)]
+            .into_iter()
+            .find_map(|(own, other)| Some((own, own.odd(&other.rms, true)?)))?,
+        _ => {
+            let usual = medians(all, joints.len());
+            all.iter()
+                .find_map(|own| Some((own, own.odd(&usual, false)?)))?
+        }
+    };
     let others = match all {
         [one, other] => format!(
             "log `{}`",
@@ -132,11 +143,11 @@ mod tests {
 
     #[test]
     fn one_of_two_logs_with_another_unit_is_named_with_the_other() {
-        let wanted = "the torque of log `b` is 1.0e6 times that of log `a` on every joint";
-        said(&[[3.0, 2.0], [3e6, 2e6]], Some(wanted));
-        let wanted = "the torque of log `a` is 1.0e6 times that of log `b` on every joint";
-        said(&[[3e6, 2e6], [3.0, 2.0]], Some(wanted));
-        let wanted = "the torque of log `b` is 2.0e4 times that of log `a` on joint `knee`";
+        let wanted = "the torque of log `b` is 2.0e7 times that of log `a` on every joint";
+        said(&[[3.0, 2.0], [6e7, 4e7]], Some(wanted));
+        let wanted = "the torque of log `a` is 2.0e7 times that of log `b` on every joint";
+        said(&[[6e7, 4e7], [3.0, 2.0]], Some(wanted));
+        let wanted = "the torque of log `b` is 20000 times that of log `a` on joint `knee`";
         said(&[[3.0, 2.0], [4.0, 4e4]], Some(wanted));
         said(&[[3.0, 2.0], [60.0, 80.0]], None);
     }
