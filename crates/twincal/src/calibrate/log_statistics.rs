@@ -259,8 +259,14 @@ fn require_unit(log: &str, compared: &Look) -> Result<()> {
     let Some((joint, times)) = compared.sizes.iter().find(|(_, times)| odd(*times)) else {
         return Ok(());
     };
+    // The column that is read as this joint's torque: it may be another one's.
+    let column = |joint: &String| {
+        let mut checks = compared.joints.iter();
+        let own = checks.find(|own| own.joint == *joint);
+        own.map_or_else(|| joint.clone(), |own| own.torque.0.clone())
+    };
     let joints = match joint {
-        Some(joint) => format!("joint `{joint}`"),
+        Some(joint) => format!("joint `{}`", column(joint)),
         None => "all joints".into(),
     };
     Err(Error::Log {
