@@ -294,11 +294,11 @@ fn what_no_program_of_ours_wrote_is_refused() {
     };
     refused(
         with(&|own| own.metadata.format = 1),
-        "has format 1, this program reads 2; make it anew",
+        "has format 1, this program reads 3; make it anew",
     );
     refused(
-        with(&|own| own.metadata.format = 3),
-        "has format 3, this program reads 2; read it with a newer",
+        with(&|own| own.metadata.format = 4),
+        "has format 4, this program reads 3; read it with a newer",
     );
     refused(
         with(&|own| own.metadata.logs.clear()),

@@ -100,7 +100,7 @@ mod tests {
         };
         assert_eq!(
             of(same(Alike::EveryMotion)),
-            "same torque as b.tensor, structurally; P(at least one) 0.98"
+            "same torque as b.tensor, structurally; P(at least one) 0.980"
         );
         assert!(of(same(Alike::TheseLogs)).contains(", in these logs only;"));
         assert_eq!(
