@@ -13,7 +13,7 @@ import pyarrow
 import pyarrow.parquet
 from mcap.writer import CompressionType, Writer
 
-ASSETS = Path(__file__).resolve().parents[1] / "planar_arm" / "assets"
+ASSETS = Path(__file__).resolve().parents[2] / "crates/twincal-cli/assets"
 JOINTS = ("shoulder", "elbow")
 ROWS = 1500
 SCHEMA = """std_msgs/Header header

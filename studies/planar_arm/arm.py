@@ -17,7 +17,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-ASSETS = Path(__file__).resolve().parent / "assets"
+ASSETS = Path(__file__).resolve().parents[2] / "crates/twincal-cli/assets"
 JOINTS = ("shoulder", "elbow")
 BODIES = ("upper_arm", "forearm")
 
@@ -75,7 +75,7 @@ REAL = replace(
 
 
 def mujoco_model(arm):
-    """`assets/arm.xml` with this arm's numbers written into it, compiled."""
+    """The demo's `arm.xml` with this arm's numbers written into it, compiled."""
     spec = mujoco.MjSpec.from_file(str(ASSETS / "arm.xml"))
     spec.option.gravity = arm.gravity
     for name, link in zip(BODIES, arm.links):

@@ -1,6 +1,6 @@
 """The paper's study: logs of a planar arm from MuJoCo, and the exact coefficient of every candidate.
 
-    python simulate.py                      writes assets/ anew: the demo's logs and truth.json
+    python simulate.py                      writes the demo's files anew: logs and truth.json
     python simulate.py --help               noise, friction, rates, encoder-only logs; -o chooses another folder
 
 MuJoCo integrates the real arm under a tracking controller. What the real arm has beyond rigid bodies, a hidden
@@ -262,7 +262,7 @@ def write(study, folder, form="parquet"):
 def main():
     """Command line: every option is a field of `Settings`."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("-o", "--output", default=str(ASSETS), help="folder (default: this study's assets)")
+    parser.add_argument("-o", "--output", default=str(ASSETS), help="folder (default: the demo's assets)")
     parser.add_argument("--form", choices=("parquet", "csv"), default="parquet")
     defaults = Settings()
     for name in ("rate_hz", "duration", "train", "heldout", "noise_sd", "noise_time", "viscous", "coulomb",

@@ -80,7 +80,7 @@ def main():
     arguments.add_argument("--data", type=Path, default=ROOT.parent / "shared/data")
     given = arguments.parse_args()
     print("| robot | model | starts | median position error after 1 s per joint, rad |\n|---|---|---|---|")
-    assets = ROOT / "studies/planar_arm/assets"
+    assets = ROOT / "crates/twincal-cli/assets"
     study("planar arm", assets / "arm.xml", lambda _: [assets / f"train{k}.parquet" for k in (1, 2, 3)],
           load(assets / "heldout1.parquet"), 0, "[library]\ngeneric = false\n", 50, True)  # fmt: skip
     ur10 = given.data / "ur10"

@@ -10,7 +10,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 STUDY = ROOT / "studies" / "planar_arm"
-ASSETS = STUDY / "assets"
+ASSETS = ROOT / "crates/twincal-cli/assets"
 SHARED = ROOT.parent / "shared" / "data"
 sys.path.insert(0, str(STUDY))
 

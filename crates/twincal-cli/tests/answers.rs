@@ -282,7 +282,7 @@ fn case_96_a_prior_that_the_data_contradict_is_told() {
 #[test]
 fn a_residual_with_a_long_memory_is_fitted_all_the_same() {
     let folder = folder();
-    let assets = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../studies/planar_arm/assets");
+    let assets = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets");
     let config = "[library]\nterms = [\"sin(q2)\"]\ngeneric = false\nfamilies = []\n[signal]\ncutoff_hz = 0\n";
     fs::write(folder.path().join("one.toml"), config).unwrap();
     let (log, model) = (assets.join("train1.parquet"), assets.join("arm.urdf"));

@@ -254,7 +254,7 @@ fn case_42_utf_16() {
 fn case_46_and_47_parquet_that_lies() {
     let whole = fs::read(concat!(
         env!("CARGO_MANIFEST_DIR"),
-        "/../../studies/planar_arm/assets/train1.parquet"
+        "/assets/train1.parquet"
     ))
     .unwrap();
     with_log(&whole[..whole.len() / 2])

@@ -410,7 +410,7 @@ fn torque_that_never_changes_is_named() {
 #[test]
 fn case_105_no_limit_of_the_address_space_ends_in_an_abort() {
     let folder = folder();
-    let assets = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../studies/planar_arm/assets");
+    let assets = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets");
     // The system does not load the program itself in less.
     for kb in [40_000, 60_000, 80_000, 100_000, 120_000, 200_000] {
         let line = format!(

@@ -12,7 +12,7 @@ use twincal_io::log::read_log;
 use twincal_io::model::{ModelSettings, read_model};
 
 fn asset(name: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../studies/planar_arm/assets");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../twincal-cli/assets");
     folder.join(name)
 }
 

@@ -16,10 +16,7 @@ use twincal_io::log::{LogOptions, read_log};
 use twincal_io::model::{ModelSettings, read_model};
 
 const DATA: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data");
-const STUDY: &str = concat!(
-    env!("CARGO_MANIFEST_DIR"),
-    "/../../studies/planar_arm/assets"
-);
+const STUDY: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../twincal-cli/assets");
 
 /// Model and logs; `None` (and said) where the data are absent.
 fn load(folder: &Path, model: &str, files: &[&str]) -> Option<(Robot, Vec<Recording>)> {

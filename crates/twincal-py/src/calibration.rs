@@ -1,12 +1,14 @@
 //! A calibration: tables, torque, draws, files.
 
 use crate::errors::Problem;
+use crate::follow::Following;
 use crate::pool;
-use crate::robot::numbers;
+use crate::robot::{numbers, owned};
 use crate::tables::{self, Table};
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use std::path::PathBuf;
+use std::sync::Arc;
 use twincal::calibrate::Along;
 use twincal::posterior::draws::draw;
 use twincal_cli::session::Fitted;
@@ -19,12 +21,14 @@ const STREAM: u64 = (1 << 32) + 3;
 #[pyclass(frozen, module = "twincal._twincal")]
 #[derive(Debug)]
 pub(crate) struct Calibration {
-    fitted: Fitted,
+    fitted: Arc<Fitted>,
 }
 
 impl Calibration {
     pub(crate) fn new(fitted: Fitted) -> Self {
-        Self { fitted }
+        Self {
+            fitted: Arc::new(fitted),
+        }
     }
 
     fn result(&self) -> &twincal::calibrate::Calibration {
@@ -61,7 +65,7 @@ impl Calibration {
     #[staticmethod]
     fn load(py: Python<'_>, folder: PathBuf) -> PyResult<Self> {
         let fitted = pool::detached(py, None, || Fitted::load(&folder))?;
-        Ok(Self { fitted })
+        Ok(Self::new(fitted))
     }
 
     /// Writes the folder.
@@ -137,9 +141,11 @@ impl Calibration {
         qd: PyReadonlyArray1<'py, f64>,
         qdd: PyReadonlyArray1<'py, f64>,
     ) -> PyResult<Torque<'py>> {
-        let (q, qd, qdd) = (numbers(py, &q)?, numbers(py, &qd)?, numbers(py, &qdd)?);
-        let twin = &self.result().twin;
-        let torque = pool::detached(py, None, || twin.torque(q, qd, qdd))?;
+        let (q, qd, qdd) = (owned(py, &q)?, owned(py, &qd)?, owned(py, &qdd)?);
+        let fitted = Arc::clone(&self.fitted);
+        let torque = Following::SILENTLY.run(py, move |_| {
+            Ok(fitted.stored.calibration.twin.torque(&q, &qd, &qdd)?)
+        })?;
         Ok((
             PyArray1::from_vec(py, torque.mean),
             PyArray1::from_vec(py, torque.low),

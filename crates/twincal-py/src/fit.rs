@@ -1,30 +1,17 @@
-//! A fit on threads of its own, so that Python hears of its stages and of Ctrl-C while it runs.
+//! Fits of logs and of statistics, and the settings that they take.
 
 use crate::calibration::Calibration;
 use crate::errors::Problem;
+use crate::follow::{Following, Step};
 use crate::log::Log;
-use crate::pool;
 use crate::robot::Robot;
 use crate::settings;
 use crate::statistics::Statistics;
 use pyo3::prelude::*;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
-use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Duration;
 use twincal::calibrate::Stage;
 use twincal_cli::Failure;
 use twincal_cli::session::{Fitted, LogSource, Request};
 use twincal_io::config::{Config, LogEntry, LogTable};
-
-/// Between two looks for Ctrl-C.
-const LOOK: Duration = Duration::from_millis(50);
-
-/// What the thread that fits says.
-enum Message {
-    Stage(Stage),
-    Done(Box<Result<Fitted, Problem>>),
-}
 
 /// Settings, with those of the model and of the logs.
 pub(crate) fn config_of(robot: &Robot, logs: &[&Log], keywords: &str) -> Result<Config, Problem> {
@@ -81,7 +68,7 @@ fn add_log(config: &mut Config, log: &Log) -> Result<(), Problem> {
                     "`{}` names other columns than a log before it",
                     log.source.given().display()
                 ),
-                "give all logs of a fit the same columns=",
+                "give all logs of a call the same columns=",
             )
             .into());
         }
@@ -113,81 +100,16 @@ pub(crate) fn fit(
         logs: sources(&logs),
         heldout: sources(&heldout),
     };
-    let stop = Arc::new(AtomicBool::new(false));
-    let messages = start(request, &stop).map_err(|problem| problem.raise(py))?;
-    let outcome = follow(py, &messages, progress.as_ref());
-    if outcome.is_err() {
-        stop.store(true, Ordering::Relaxed);
-    }
-    match outcome? {
-        Ok(fitted) => Ok(Calibration::new(fitted)),
-        Err(problem) => Err(problem.raise(py)),
-    }
-}
-
-/// Starts the fit; its thread ends at the next stage after `stop`.
-fn start(request: Request, stop: &Arc<AtomicBool>) -> Result<Mutex<Receiver<Message>>, Problem> {
-    let (send, receive): (Sender<Message>, _) = channel();
-    let stop = Arc::clone(stop);
-    let threads = request.config.file.inference.threads;
-    let threads = threads.and_then(|count| usize::try_from(count).ok());
-    let run = move || {
-        let stages = Mutex::new(send.clone());
-        let watch = |stage: Stage| {
-            if stop.load(Ordering::Relaxed) {
-                return Err(twincal::Error::Cancelled);
-            }
-            let send = stages.lock().unwrap_or_else(PoisonError::into_inner);
-            // Nobody listens to a fit that was given up.
-            send.send(Message::Stage(stage))
-                .map_err(|_| twincal::Error::Cancelled)
-        };
-        let done = pool::work(threads, || request.fit(&watch));
-        // Nobody listens to a fit that was given up.
-        let _ = send.send(Message::Done(Box::new(done)));
-    };
-    let thread = std::thread::Builder::new()
-        .name("twincal fit".into())
-        .spawn(run);
-    thread.map_err(|e| {
-        let failure = Failure::usage(
-            format!("cannot start a thread: {e}"),
-            "raise the limit of processes (ulimit -u)",
-        );
-        Problem::from(failure)
+    let following = Following::of(&request.config, progress.as_ref());
+    let following = following.map_err(|problem| problem.raise(py))?;
+    let fitted = following.run(py, move |watch| {
+        Ok(request.fit(&|stage| watch(step(stage)))?)
     })?;
-    Ok(Mutex::new(receive))
-}
-
-/// Hears what the fit says until it is done; Ctrl-C and exceptions of `progress` end it.
-fn follow(
-    py: Python<'_>,
-    messages: &Mutex<Receiver<Message>>,
-    progress: Option<&Bound<'_, PyAny>>,
-) -> PyResult<Result<Fitted, Problem>> {
-    loop {
-        let next = py.detach(|| {
-            let messages = messages.lock().unwrap_or_else(PoisonError::into_inner);
-            messages.recv_timeout(LOOK)
-        });
-        match next {
-            Ok(Message::Done(result)) => return Ok(*result),
-            Ok(Message::Stage(stage)) => {
-                if let Some(progress) = progress {
-                    progress.call1(words(stage))?;
-                }
-            }
-            Err(RecvTimeoutError::Timeout) => {}
-            Err(RecvTimeoutError::Disconnected) => {
-                return Ok(Err(Problem::Panicked("the thread of the fit ended".into())));
-            }
-        }
-        py.check_signals()?;
-    }
+    Ok(Calibration::new(fitted))
 }
 
 /// A stage for Python: its name, and how many of its parts are done of how many.
-fn words(stage: Stage) -> (&'static str, usize, usize) {
+fn step(stage: Stage) -> Step {
     match stage {
         Stage::Rows => ("filtering the logs", 0, 1),
         Stage::Inference => ("computing probabilities of all candidates", 0, 1),
@@ -205,10 +127,23 @@ pub(crate) fn fit_statistics(
     keywords: &str,
 ) -> PyResult<Calibration> {
     let held_out = sources(&heldout);
-    let fitted = pool::detached(py, None, || {
-        let config = settings::config(keywords)?;
-        let file = statistics.file.clone();
-        Ok::<_, Problem>(Fitted::of_statistics(file, &config, &held_out)?)
+    let config = settings::config(keywords).map_err(|problem| problem.raise(py))?;
+    let following = Following::of(&config, None).map_err(|problem| problem.raise(py))?;
+    let file = statistics.file.clone();
+    let fitted = following.run(py, move |watch| {
+        let watch = |stage| watch(step(stage));
+        Ok(Fitted::of_statistics(file, &config, &held_out, &watch)?)
     })?;
     Ok(Calibration::new(fitted))
+}
+
+/// `[[log]]` and `[columns]` of logs as the text of a `twincal.toml`, for commands of the program.
+#[pyfunction]
+pub(crate) fn log_settings(py: Python<'_>, logs: Vec<PyRef<'_, Log>>) -> PyResult<String> {
+    let mut config = Config::default();
+    for log in &logs {
+        add_log(&mut config, log).map_err(|problem| problem.raise(py))?;
+    }
+    let text = toml::to_string(&config.file);
+    text.map_err(|e| Problem::Panicked(format!("settings of logs: {e}")).raise(py))
 }

@@ -4,12 +4,14 @@
 mod calibration;
 mod errors;
 mod fit;
+mod follow;
 mod log;
 mod pool;
 mod regression;
 mod robot;
 mod settings;
 mod statistics;
+mod table_columns;
 mod tables;
 
 use pyo3::prelude::*;
@@ -30,7 +32,7 @@ mod _twincal {
     #[pymodule_export]
     use super::tables::Table;
     #[pymodule_export]
-    use super::{call, command, fit::fit, fit::fit_statistics, version};
+    use super::{call, command, fit::fit, fit::fit_statistics, fit::log_settings, version};
 }
 
 /// Version of the package, which is that of the program.

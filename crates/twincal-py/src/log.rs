@@ -2,12 +2,9 @@
 
 use crate::errors::Problem;
 use crate::pool;
-use crate::robot::numbers;
-use arrow_array::cast::AsArray as _;
+use crate::robot::owned;
+use crate::table_columns::columns_of;
 use arrow_array::ffi_stream::{FFI_ArrowArrayStream, RecordBatchStreamReader};
-use arrow_array::types::{Float32Type, Float64Type, Int32Type, Int64Type};
-use arrow_array::{Array, RecordBatch, RecordBatchReader as _};
-use arrow_schema::DataType;
 use numpy::PyReadonlyArray1;
 use pyo3::prelude::*;
 use pyo3::types::PyCapsule;
@@ -15,6 +12,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use twincal_cli::Failure;
 use twincal_cli::session::{Columns, LogSource};
+use twincal_io::log::Column;
 
 /// Where a log comes from, and the keys of `[[log]]` and `[columns]` as objects of JSON.
 #[pyclass(frozen, module = "twincal._twincal")]
@@ -41,12 +39,13 @@ impl Log {
         }
     }
 
-    /// Arrays by name of column.
+    /// Arrays by name of column; `others` are columns without numbers, and what they hold.
     #[staticmethod]
     fn arrays(
         py: Python<'_>,
         name: String,
         named: Vec<(String, PyReadonlyArray1<'_, f64>)>,
+        others: Vec<(String, String)>,
         entry: String,
         columns: String,
     ) -> PyResult<Self> {
@@ -54,7 +53,11 @@ impl Log {
         let mut own = Vec::new();
         for (column, values) in &named {
             header.push(column.clone());
-            own.push(numbers(py, values)?.to_vec());
+            own.push(Column::Numbers(owned(py, values)?));
+        }
+        for (column, what) in others {
+            header.push(column);
+            own.push(Column::Other(what));
         }
         let source = py.detach(|| Columns::new(name, header, own));
         Ok(Self {
@@ -97,16 +100,32 @@ impl Log {
         }
     }
 
-    /// Columns in memory by name; none for a file.
+    /// Columns of numbers in memory by name; none for a file.
     fn in_memory<'py>(&self, py: Python<'py>) -> Vec<(String, Bound<'py, numpy::PyArray1<f64>>)> {
+        let columns = self.columns_in_memory().into_iter();
+        let columns = columns.flat_map(|own| own.header.iter().cloned().zip(&own.columns));
+        columns
+            .filter_map(|(name, own)| Some((name, numpy::PyArray1::from_slice(py, own.numbers()?))))
+            .collect()
+    }
+
+    /// Columns in memory that hold no numbers, and what they hold.
+    fn others(&self) -> Vec<(String, String)> {
+        let columns = self.columns_in_memory().into_iter();
+        let columns = columns.flat_map(|own| own.header.iter().zip(&own.columns));
+        let other = |(name, own): (&String, &Column)| match own {
+            Column::Other(what) => Some((name.clone(), what.clone())),
+            Column::Numbers(_) | Column::Stamps { .. } => None,
+        };
+        columns.filter_map(other).collect()
+    }
+}
+
+impl Log {
+    fn columns_in_memory(&self) -> Option<&Columns> {
         match &self.source {
-            LogSource::File(_) => Vec::new(),
-            LogSource::Columns(own) => {
-                let columns = own.header.iter().cloned().zip(&own.columns);
-                columns
-                    .map(|(name, x)| (name, numpy::PyArray1::from_slice(py, x)))
-                    .collect()
-            }
+            LogSource::File(_) => None,
+            LogSource::Columns(own) => Some(&**own),
         }
     }
 }
@@ -136,55 +155,4 @@ fn reader_of(py: Python<'_>, capsule: &Bound<'_, PyCapsule>) -> PyResult<RecordB
     // GIL is held, so that nobody else reads the struct meanwhile.
     let reader = unsafe { RecordBatchStreamReader::from_raw(stream.as_ptr()) };
     reader.map_err(|e| refuse(e.to_string()))
-}
-
-/// All columns of numbers of a table.
-fn columns_of(name: String, reader: RecordBatchStreamReader) -> Result<Columns, Problem> {
-    let refuse = |problem: String| {
-        let remedy = "give a table with one column of numbers per channel";
-        Problem::from(Failure::usage(format!("`{name}` {problem}"), remedy))
-    };
-    let schema = reader.schema();
-    let wanted: Vec<usize> = (0..schema.fields().len())
-        .filter(|&index| is_number(schema.field(index).data_type()))
-        .collect();
-    let header = wanted
-        .iter()
-        .map(|&index| schema.field(index).name().clone());
-    let header: Vec<String> = header.collect();
-    let mut columns = vec![Vec::new(); wanted.len()];
-    for batch in reader {
-        let batch = batch.map_err(|e| refuse(format!("cannot be read: {e}")))?;
-        for (own, index) in columns.iter_mut().zip(&wanted) {
-            append(&batch, *index, own);
-        }
-    }
-    Ok(Columns::new(name, header, columns))
-}
-
-fn is_number(kind: &DataType) -> bool {
-    matches!(
-        kind,
-        DataType::Float64 | DataType::Float32 | DataType::Int64 | DataType::Int32
-    )
-}
-
-/// Numbers of a column, NaN where it has none.
-fn append(batch: &RecordBatch, index: usize, own: &mut Vec<f64>) {
-    let column = batch.column(index);
-    macro_rules! extend {
-        ($kind:ty) => {{
-            let array = column.as_primitive::<$kind>();
-            match array.null_count() {
-                0 => own.extend(array.values().iter().map(|&x| x as f64)),
-                _ => own.extend(array.iter().map(|x| x.map_or(f64::NAN, |x| x as f64))),
-            }
-        }};
-    }
-    match column.data_type() {
-        DataType::Float64 => extend!(Float64Type),
-        DataType::Float32 => extend!(Float32Type),
-        DataType::Int64 => extend!(Int64Type),
-        _ => extend!(Int32Type),
-    }
 }

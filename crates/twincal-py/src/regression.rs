@@ -1,11 +1,13 @@
 //! Spike-and-slab regression of any columns.
 
 use crate::errors::Problem;
+use crate::follow::{Following, Watch};
 use crate::pool;
-use crate::robot::numbers;
+use crate::robot::{numbers, owned};
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
-use twincal::infer::{Choice, InferenceSettings};
+use std::sync::Arc;
+use twincal::infer::{Choice, EXACT_LIMIT, InferenceSettings};
 use twincal::likelihood::NoiseModel;
 use twincal::posterior::draws::draw;
 use twincal::posterior::summary::{ColumnSummary, summarise};
@@ -13,6 +15,7 @@ use twincal::prior::{Inclusion, PriorSettings};
 use twincal::regression::{self, Design, Regressed};
 use twincal::signal::Auto;
 use twincal_cli::Failure;
+use twincal_io::config::{Config, InferenceTable, MethodWord};
 
 /// Random stream of its draws.
 const STREAM: u64 = (1 << 32) + 4;
@@ -24,7 +27,7 @@ type Numbers<'py> = Bound<'py, PyArray1<f64>>;
 #[pyclass(frozen, module = "twincal._twincal")]
 #[derive(Debug)]
 pub(crate) struct Regression {
-    regressed: Regressed,
+    regressed: Arc<Regressed>,
     summaries: Vec<ColumnSummary>,
 }
 
@@ -37,8 +40,8 @@ pub(crate) struct Asked {
     scaled_variance: Option<f64>,
     expected_terms: Option<f64>,
     probability: Option<f64>,
-    chains: usize,
-    draws: usize,
+    chains: u64,
+    draws: u64,
     seed: u64,
     intercept: bool,
 }
@@ -62,11 +65,12 @@ impl Asked {
             }
         };
         let method = match self.method.as_str() {
-            "auto" => Choice::Auto,
-            "exact" => Choice::Exact,
-            "gibbs" => Choice::Gibbs,
+            "auto" => MethodWord::Auto,
+            "exact" => MethodWord::Exact,
+            "gibbs" => MethodWord::Gibbs,
             other => return Err(unknown("method", other, "`auto`, `exact`, `gibbs`")),
         };
+        let inference = self.inference(method)?;
         let inclusion = match (self.probability, self.expected_terms) {
             (Some(probability), _) => Some(Inclusion::Probability(probability)),
             (None, Some(terms)) => Some(Inclusion::ExpectedTerms(terms)),
@@ -84,14 +88,42 @@ impl Asked {
                 forced: Vec::new(),
                 heredity: None,
             },
-            inference: InferenceSettings {
-                method,
-                chains: self.chains,
-                draws: self.draws,
-                seed: self.seed,
-                allow_disagreement: true,
-            },
+            inference,
         })
+    }
+
+    /// `[inference]` with the limits of `twincal.toml`; draws that the memory does not hold are refused.
+    fn inference(&self, method: MethodWord) -> Result<InferenceSettings, Problem> {
+        let mut config = Config::default();
+        config.file.inference = InferenceTable {
+            method: Some(method),
+            chains: Some(self.chains),
+            draws: Some(self.draws),
+            seed: Some(self.seed),
+            threads: None,
+        };
+        let mut inference = config.settings()?.calibration.inference;
+        inference.allow_disagreement = true;
+        let samples = match inference.method {
+            Choice::Auto => self.groups.iter().max() >= Some(&EXACT_LIMIT),
+            Choice::Exact => false,
+            Choice::Gibbs => true,
+        };
+        if samples {
+            // a chain also keeps two numbers per draw to be compared by
+            let numbers = [inference.chains, inference.draws, self.groups.len() + 2];
+            pool::require_memory("draws of all chains", &numbers)?;
+        }
+        Ok(inference)
+    }
+}
+
+impl Regression {
+    fn new(regressed: Regressed) -> Self {
+        Self {
+            summaries: summarise(&regressed.posterior),
+            regressed: Arc::new(regressed),
+        }
     }
 }
 
@@ -121,21 +153,16 @@ pub(crate) fn regress(
     breaks: Vec<usize>,
     asked: Asked,
 ) -> PyResult<Regression> {
-    let (x, y, decoys) = (numbers(py, &x)?, numbers(py, &y)?, numbers(py, &decoys)?);
     let settings = asked.settings().map_err(|problem| problem.raise(py))?;
-    let design = Design {
-        x,
-        y,
-        breaks: &breaks,
-        decoys,
-    };
-    pool::detached(py, None, || {
-        let regressed = regression::regress(design, &settings)?;
-        let summaries = summarise(&regressed.posterior);
-        Ok::<_, Problem>(Regression {
-            regressed,
-            summaries,
-        })
+    let (x, y, decoys) = (owned(py, &x)?, owned(py, &y)?, owned(py, &decoys)?);
+    Following::SILENTLY.run(py, move |_| {
+        let design = Design {
+            x: &x,
+            y: &y,
+            breaks: &breaks,
+            decoys: &decoys,
+        };
+        Ok(Regression::new(regression::regress(design, &settings)?))
     })
 }
 
@@ -206,15 +233,15 @@ impl Regression {
         py: Python<'py>,
         rows: PyReadonlyArray1<'py, f64>,
     ) -> PyResult<(Numbers<'py>, Numbers<'py>)> {
-        let rows = numbers(py, &rows)?;
-        let (mean, sd) =
-            pool::detached(py, None, || Ok::<_, Problem>(self.regressed.predict(rows)))?;
+        let (rows, regressed) = (owned(py, &rows)?, Arc::clone(&self.regressed));
+        let predict = move |_: Watch<'_>| Ok(regressed.predict(&rows));
+        let (mean, sd) = Following::SILENTLY.run(py, predict)?;
         Ok((PyArray1::from_vec(py, mean), PyArray1::from_vec(py, sd)))
     }
 
     /// The whole posterior as JSON, for pickle.
     fn to_json(&self, py: Python<'_>) -> PyResult<String> {
-        let text = serde_json::to_string(&self.regressed);
+        let text = serde_json::to_string(&*self.regressed);
         text.map_err(|e| Problem::Panicked(e.to_string()).raise(py))
     }
 
@@ -225,11 +252,7 @@ impl Regression {
             let failure = Failure::usage(format!("not a pickled regression: {e}"), "fit again");
             Problem::from(failure).raise(py)
         })?;
-        let summaries = summarise(&regressed.posterior);
-        Ok(Self {
-            regressed,
-            summaries,
-        })
+        Ok(Self::new(regressed))
     }
 
     /// Draws of the coefficients, draw * columns + column.

@@ -40,6 +40,11 @@ pub(crate) fn numbers<'a>(
         .map_err(|_| Problem::Panicked("an array that is not contiguous".into()).raise(py))
 }
 
+/// A copy of the numbers, for a thread that may outlive the call.
+pub(crate) fn owned(py: Python<'_>, array: &PyReadonlyArray1<'_, f64>) -> PyResult<Vec<f64>> {
+    numbers(py, array).map(<[f64]>::to_vec)
+}
+
 #[pymethods]
 impl Robot {
     /// Of a file, with settings of [model] as an object of JSON.

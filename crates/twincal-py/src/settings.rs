@@ -37,7 +37,11 @@ pub(crate) fn config(keywords: &str) -> Result<Config, Problem> {
     }
     let table =
         toml::Table::try_from(Value::Object(tables)).map_err(|e| internal(e.to_string()))?;
-    Ok(Config::parse(NAME, &table.to_string())?)
+    let parsed = Config::parse(NAME, &table.to_string())?;
+    // A keyword stands in no file: a message about its range names the key, not a line of text that nobody wrote.
+    let mut config = Config::default();
+    config.file = parsed.file;
+    Ok(config)
 }
 
 /// Refuses a value that no twincal.toml can hold: None in a list, a whole number beyond 64 bits.

@@ -2,11 +2,13 @@
 
 use crate::errors::Problem;
 use crate::fit::{config_of, sources};
+use crate::follow::Following;
 use crate::log::Log;
 use crate::pool;
 use crate::robot::Robot;
 use pyo3::prelude::*;
 use std::path::PathBuf;
+use std::sync::Arc;
 use twincal_cli::Failure;
 use twincal_cli::session::{self, Request};
 use twincal_io::artifact::{Inputs, OutputFile};
@@ -16,7 +18,7 @@ use twincal_io::statistics::StatisticsFile;
 #[pyclass(frozen, module = "twincal._twincal")]
 #[derive(Debug)]
 pub(crate) struct Plan {
-    plan: twincal::calibrate::Plan,
+    plan: Arc<twincal::calibrate::Plan>,
     keywords: String,
 }
 
@@ -43,8 +45,11 @@ pub(crate) fn plan(
         logs: sources(&logs),
         heldout: Vec::new(),
     };
-    let plan = pool::detached(py, None, || request.plan())?;
-    Ok(Plan { plan, keywords })
+    let plan = Following::SILENTLY.run(py, move |_| Ok(request.plan()?))?;
+    Ok(Plan {
+        plan: Arc::new(plan),
+        keywords,
+    })
 }
 
 #[pymethods]
@@ -53,8 +58,11 @@ impl Statistics {
     #[staticmethod]
     fn map(py: Python<'_>, robot: &Robot, log: &Log, plan: &Plan) -> PyResult<Self> {
         let config = config_of(robot, &[log], &plan.keywords).map_err(|e| e.raise(py))?;
-        let made = || session::statistics(&robot.input, &plan.plan, &log.source, &config);
-        let file = pool::detached(py, None, made)?;
+        let (input, plan) = (robot.input.clone(), Arc::clone(&plan.plan));
+        let source = log.source.clone();
+        let file = Following::SILENTLY.run(py, move |_| {
+            Ok(session::statistics(&input, &plan, &source, &config)?)
+        })?;
         Ok(Self { file })
     }
 

@@ -65,25 +65,61 @@ def test_processes(arm, method, tmp_path):
     assert done.stdout.strip() == "True", done.stderr
 
 
-def test_ctrl_c_ends_a_fit_within_a_second(arm):
-    code = FIT + textwrap.dedent(
-        """
-        import os, signal, threading, time
-        # A shell that starts the tests behind it leaves SIGINT ignored.
-        signal.signal(signal.SIGINT, signal.default_int_handler)
-        logs = [twincal.Log.read(path) for path in sys.argv[2:5]]
-        began = time.monotonic()
-        try:
-            threading.Timer(0.1, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
-            twincal.fit(robot, logs, method="gibbs", draws=400000, chains=4)
-        except KeyboardInterrupt:
-            print(time.monotonic() - began, flush=True)
-        os._exit(0)
-        """
-    )
-    files = [arm.folder / f"run{k}.csv" for k in (1, 2, 3)]
-    done = python(code, arm.model, *files)
-    assert float(done.stdout) < 1.1, done.stderr
+INTERRUPTED = """
+import os, signal, sys, threading, time
+import numpy as np
+import twincal
+# A shell that starts the tests behind it leaves SIGINT ignored.
+signal.signal(signal.SIGINT, signal.default_int_handler)
+robot = twincal.Robot.from_urdf(sys.argv[2])
+log = twincal.Log.read(sys.argv[3])
+few = {"families": ["payload", "viscous", "coulomb"], "generic": False}
+gibbs = {"method": "gibbs", "draws": 400_000}
+
+def regression(method):
+    X = np.random.default_rng(1).standard_normal((500, 30))
+    return lambda: getattr(twincal.SpikeSlabRegressor(**gibbs), method)(X, X[:, 0] + X[:, 1])
+
+def statistics():
+    made = twincal.Statistics.map(robot, log, twincal.Statistics.plan(robot, log, **few))
+    return lambda: made.fit(**gibbs)
+
+def predict():
+    states = np.random.default_rng(1).uniform(-1.0, 1.0, (3, 10_000_000, 2))
+    result = twincal.fit(robot, log, **few)
+    return lambda: result.predict(*states)
+
+call = {
+    "fit": lambda: lambda: twincal.fit(robot, log, **few, **gibbs),
+    "Statistics.fit": statistics,
+    "SpikeSlabRegressor.fit": lambda: regression("fit"),
+    "Calibration.predict": predict,
+}[sys.argv[1]]()
+sent = []
+
+def interrupt():
+    sent.append(time.monotonic())
+    os.kill(os.getpid(), signal.SIGINT)
+
+try:
+    threading.Timer(1.0, interrupt).start()
+    call()
+    print("ended by itself", flush=True)
+except KeyboardInterrupt:
+    print(time.monotonic() - sent[0], flush=True)
+os._exit(0)
+"""
+
+
+@pytest.mark.parametrize(
+    "call", ["fit", "Statistics.fit", "SpikeSlabRegressor.fit", "Calibration.predict"]
+)
+def test_ctrl_c_ends_a_call_within_a_second(arm, call):
+    """A second after the call, when it samples or predicts."""
+    if call.startswith("Spike"):
+        pytest.importorskip("sklearn")
+    done = python(INTERRUPTED, call, arm.model, arm.folder / "run1.csv")
+    assert float(done.stdout) < 1.0, done.stderr
 
 
 def test_progress_is_called_and_may_stop(arm, robot):
@@ -132,6 +168,7 @@ began = time.perf_counter()
 import twincal
 print(time.perf_counter() - began)
 heavy = {"sklearn", "arviz", "matplotlib", "pandas", "polars", "xarray", "scipy", "tqdm"}
+twincal.fit
 print(sorted(heavy & set(sys.modules)))
 """
     best = []

@@ -199,6 +199,15 @@ def test_decoys_make_what_no_column_describes_count_as_noise():
     assert covered["decoys"] >= 32 > covered["iid"]
 
 
+def test_noise_of_decoys_asks_for_them_by_name():
+    """`check_estimator` calls `fit(X, y)` alone, which this noise cannot do: the docstring says so."""
+    X, y, _ = data(50, 3, 6)
+    with pytest.raises(ValueError, match=r"give decoys=.*twincal\.decoys\(q, qd\)"):
+        SpikeSlabRegressor(noise="decoys").fit(X, y)
+    said = " ".join(SpikeSlabRegressor.__doc__.split())
+    assert "`fit` then requires `decoys`" in said and "check_estimator" in said
+
+
 def test_decoys_are_their_definition_and_belong_to_one_noise():
     q, qd, X, y = swing(1, 50)
     phi = twincal.decoys(q, qd)

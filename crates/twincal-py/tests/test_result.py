@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -74,6 +75,10 @@ def test_exports_and_gates(arm, result):
     assert same["schema"] == 1 and all(own["became"] == "as_before" for own in same["components"])
     page = result.report(arm.folder / "page.html")
     assert page.startswith("<!") and (arm.folder / "page.html").read_text() == page
+    for folder in (arm.folder, arm.folder / "none" / "page.html"):
+        with pytest.raises(twincal.errors.SystemError, match=re.escape(str(folder))) as error:
+            result.report(folder)
+        assert error.value.remedy
 
 
 def test_figures(arm, result):
@@ -99,6 +104,23 @@ def test_figures(arm, result):
     for wrong in ("wrist", 2):
         with pytest.raises(ValueError):
             plot.law(result, wrong)
+    refusals = [
+        (TypeError, "joint", lambda: plot.law(result, 1.0)),
+        (TypeError, "Calibration", lambda: plot.pip(3)),
+        (TypeError, "Calibration", lambda: plot.pair(3, terms[0], terms[1])),
+        (TypeError, "ax", lambda: plot.pip(result, ax=3)),
+        (ValueError, "along", lambda: plot.law(result, along="speed")),
+        (ValueError, "tau", lambda: plot.torque(result, time, q, qd, qdd, tau[:, 0])),
+        (ValueError, "tau", lambda: plot.torque(result, time, q, qd, qdd, tau[1:])),
+        (ValueError, "q", lambda: plot.torque(result, time, q[0], qd[0], qdd[0])),
+        (ValueError, "q", lambda: plot.torque(result, time[1:], q, qd, qdd, tau)),
+        (ValueError, "tau", lambda: plot.residual(result, q, qd, qdd, tau[:, :1])),
+        (ValueError, "qd", lambda: plot.residual(result, q, qd[1:], qdd, tau)),
+        (ValueError, "time", lambda: plot.torque(result, q, q, qd, qdd)),
+    ]
+    for kind, says, call in refusals:
+        with pytest.raises(kind, match=says):
+            call()
     pyplot.close("all")
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -67,3 +68,39 @@ def test_everything_public_has_a_docstring():
                 if public and not inspect.getdoc(getattr(own, key)):
                     missing.append(f"{name}.{key}")
     assert not missing
+
+
+def functions():
+    """Public functions and methods of the package by name, `plot` and `fleet` included."""
+    for name in twincal.__all__:
+        own = getattr(twincal, name)
+        if inspect.ismodule(own):
+            for key in own.__all__:
+                if inspect.isfunction(getattr(own, key)):
+                    yield f"{name}.{key}", getattr(own, key)
+        elif inspect.isfunction(own):
+            yield name, own
+        elif inspect.isclass(own) and not issubclass(own, (tuple, BaseException)):
+            for key in vars(own):
+                member = getattr(own, key)
+                if not key.startswith("_") and inspect.isroutine(member):
+                    yield f"{name}.{key}", member
+
+
+def test_docstrings_have_their_sections():
+    """Every parameter by name, and what is returned unless it is None."""
+    missing = []
+    for name, own in functions():
+        text, signature = inspect.getdoc(own) or "", inspect.signature(own)
+        named = re.findall(r"^((?:\*{0,2}\w+)(?:, \*{0,2}\w+)*)(?: :|$)", text, flags=re.M)
+        known = {key.lstrip("*") for line in named for key in line.split(", ")}
+        missing += [f"{name}({key})" for key in signature.parameters if key not in known | {"self"}]
+        if signature.return_annotation not in (None, "None") and "Returns\n-------" not in text:
+            missing.append(f"{name} -> {signature.return_annotation}")
+    assert not missing, missing
+
+
+def test_classes_that_others_make_refuse_anything_else():
+    for own in (twincal.Calibration, twincal.Statistics, twincal.Plan):
+        with pytest.raises(TypeError, match="made by"):
+            own(3)

@@ -22,32 +22,29 @@ A simulated two-joint arm (MuJoCo). Its model is missing a payload, friction and
 Which effects, how probable is each, and how well do they predict torque?";
 
 const FOLDER: &str = "twincal-demo";
-const MODEL: (&str, &[u8]) = (
-    "arm.urdf",
-    include_bytes!("../../../../studies/planar_arm/assets/arm.urdf"),
-);
+const MODEL: (&str, &[u8]) = ("arm.urdf", include_bytes!("../../assets/arm.urdf"));
 const TRAIN: [(&str, &[u8]); 3] = [
     (
         "train1.parquet",
-        include_bytes!("../../../../studies/planar_arm/assets/train1.parquet"),
+        include_bytes!("../../assets/train1.parquet"),
     ),
     (
         "train2.parquet",
-        include_bytes!("../../../../studies/planar_arm/assets/train2.parquet"),
+        include_bytes!("../../assets/train2.parquet"),
     ),
     (
         "train3.parquet",
-        include_bytes!("../../../../studies/planar_arm/assets/train3.parquet"),
+        include_bytes!("../../assets/train3.parquet"),
     ),
 ];
 const HELDOUT: [(&str, &[u8]); 2] = [
     (
         "heldout1.parquet",
-        include_bytes!("../../../../studies/planar_arm/assets/heldout1.parquet"),
+        include_bytes!("../../assets/heldout1.parquet"),
     ),
     (
         "heldout2.parquet",
-        include_bytes!("../../../../studies/planar_arm/assets/heldout2.parquet"),
+        include_bytes!("../../assets/heldout2.parquet"),
     ),
 ];
 

@@ -22,7 +22,7 @@ use twincal_io::artifact::{
     Artifact, Claim, Inputs, MODEL_MJCF, MODEL_URDF, Maker, RUN_LOG, Replace, sha256,
 };
 use twincal_io::config::{Config, Settings};
-use twincal_io::log::read_columns;
+use twincal_io::log::{Column, read_columns};
 use twincal_io::memory;
 use twincal_io::model::parse_model;
 use twincal_io::statistics::StatisticsFile;
@@ -88,15 +88,15 @@ pub enum LogSource {
     Columns(Arc<Columns>),
 }
 
-/// Named columns of numbers.
+/// Named columns.
 #[derive(Debug)]
 pub struct Columns {
     /// What results and messages call the log.
     pub name: String,
     /// Names, as a table has them in its first line.
     pub header: Vec<String>,
-    /// One value per sample and column, SI units.
-    pub columns: Vec<Vec<f64>>,
+    /// What each of them holds.
+    pub columns: Vec<Column>,
     /// SHA-256 of names and numbers, hexadecimal: logs with one checksum are copies.
     pub sha256: String,
 }
@@ -104,9 +104,9 @@ pub struct Columns {
 impl Columns {
     /// With the checksum of what they hold.
     #[must_use]
-    pub fn new(name: String, header: Vec<String>, columns: Vec<Vec<f64>>) -> Self {
+    pub fn new(name: String, header: Vec<String>, columns: Vec<Column>) -> Self {
         let mut lines = header.join("\n");
-        for column in &columns {
+        for column in columns.iter().filter_map(Column::numbers) {
             let bytes: Vec<u8> = column.iter().flat_map(|x| x.to_le_bytes()).collect();
             lines += &sha256(&bytes);
         }
@@ -254,7 +254,7 @@ impl Fitted {
         })
     }
 
-    /// Fits statistics, as `twincal fit --statistics` does.
+    /// Fits statistics, as `twincal fit --statistics` does; `watch` as for [`Request::fit`].
     ///
     /// # Errors
     /// Those of the program.
@@ -262,6 +262,7 @@ impl Fitted {
         file: StatisticsFile,
         config: &Config,
         heldout: &[LogSource],
+        watch: &dyn Fn(Stage) -> twincal::Result<()>,
     ) -> Outcome<Self> {
         let settings = config.settings()?;
         let robot = RobotInput::of_statistics(&file);
@@ -285,7 +286,7 @@ impl Fitted {
             output: Path::new(""),
             watch: Stopwatch::start(),
         };
-        Self::of(&mut job, &|_| Ok(()))
+        Self::of(&mut job, watch)
     }
 
     /// Reads the folder of a result.

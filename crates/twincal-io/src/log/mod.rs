@@ -9,6 +9,7 @@
 //! | Parquet | `parquet.rs`, checked first by `pages.rs`; `shared_file.rs` for several threads |
 //! | Arrow IPC | `arrow/` |
 //! | NPZ | `npz.rs` |
+//! | tables in memory | `memory_table.rs` |
 //! | MCAP, rosbag2 | `bag/`, `stamps.rs` |
 //! | other units and signs | `factors.rs` |
 //! | what the logged torque is | `torque.rs` |
@@ -23,6 +24,7 @@ mod columns;
 mod csv;
 mod factors;
 mod header;
+mod memory_table;
 #[cfg(feature = "tables")]
 mod npz;
 #[cfg(feature = "tables")]
@@ -45,6 +47,7 @@ pub(crate) use cells::Cells;
 pub(crate) use columns::has_columns;
 pub use columns::{Channel, Selection, joints_without_column, match_columns};
 pub use header::read_header;
+pub use memory_table::{Column, read_columns};
 pub use preset::Preset;
 pub use torque::{TorqueOptions, TorqueSource};
 
@@ -293,44 +296,6 @@ pub fn parse_log(
         Kind::Text | Kind::Sqlite | Kind::Zstd => csv_table(bytes, bytes.len() as u64, request)?,
     };
     in_memory(read)
-}
-
-/// A log of columns in memory, which are matched to the joints as those of a table are; `name` is what messages call it.
-///
-/// # Errors
-/// Like [`read_log`]; columns of different lengths.
-pub fn read_columns(
-    name: &str,
-    header: &[String],
-    columns: &[Vec<f64>],
-    robot: &Robot,
-    options: &LogOptions,
-) -> Result<(Recording, Vec<Finding>)> {
-    let request = Request {
-        name,
-        robot,
-        options,
-        chapters: false,
-    };
-    let rows = columns.first().map_or(0, Vec::len);
-    let other = columns.iter().position(|column| column.len() != rows);
-    if let Some(other) = other {
-        let problem = format!(
-            "column `{}` has {} samples, `{}` has {rows}",
-            header[other],
-            columns[other].len(),
-            header[0]
-        );
-        let remedy = "give one value for each time stamp, NaN where it is not known";
-        return Err(Error::content(Place::file(name), problem, remedy));
-    }
-    let selection = request.select(header)?;
-    let wanted = selection.file_columns();
-    let mut cells = Cells::default();
-    cells.columns = wanted.iter().map(|&own| columns[own].clone()).collect();
-    let mut findings = Vec::new();
-    let log = assemble(request, cells, selection, &mut findings)?;
-    in_memory((log, findings))
 }
 
 /// What a file is by its first bytes.

@@ -1,6 +1,7 @@
 //! Parquet logs: columns side by side into doubles, after the file's claims about itself have been checked.
 
 use super::cells::{Sink, disk_failure};
+use super::memory_table::typed_stamps;
 use super::pages::check_chunk;
 use super::{Cells, Request, assemble};
 use crate::error::{Error, Place, Result};
@@ -13,9 +14,8 @@ use parquet::file::reader::{ChunkReader, FileReader, SerializedFileReader};
 use parquet::schema::types::ColumnDescriptor;
 use rayon::prelude::*;
 use std::io::{Read, Seek};
-use twincal::Severity;
+use twincal::Finding;
 use twincal::signal::Log;
-use twincal::{Code, Finding};
 
 /// Values read at a time.
 const BATCH: usize = 8192;
@@ -202,13 +202,7 @@ fn scale(name: &str, column: &ColumnDescriptor, findings: &mut Vec<Finding>) -> 
         TimeUnit::MICROS => (1e6, "microseconds"),
         TimeUnit::NANOS => (1e9, "nanoseconds"),
     };
-    findings.push(Finding::new(
-        Severity::Note,
-        Code::TimestampType,
-        name,
-        format!("column `{path}` is a timestamp in {word} by its type and was turned into seconds"),
-        0,
-    ));
+    findings.push(typed_stamps(name, &path, word));
     Ok(ticks)
 }
 

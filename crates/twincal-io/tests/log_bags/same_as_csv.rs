@@ -78,7 +78,7 @@ fn fit(robot: &Robot, recording: Recording) -> Calibration {
 
 #[test]
 fn a_bag_and_its_table_give_the_same_probabilities() {
-    let assets = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../studies/planar_arm/assets");
+    let assets = Path::new(env!("CARGO_MANIFEST_DIR")).join("../twincal-cli/assets");
     let model = read_model(&assets.join("arm.urdf"), &ModelSettings::default()).unwrap();
     let (robot, _) = model.robot(&Default::default()).unwrap();
     let read = |path: &Path| {

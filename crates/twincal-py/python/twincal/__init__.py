@@ -25,22 +25,40 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from twincal import errors
-from twincal._calibration import Calibration, Draws, LogTorque, Torque, fit
-from twincal._decoys import decoys
-from twincal._design import Motion, design
-from twincal._log import Log
-from twincal._robot import Robot
-from twincal._statistics import Plan, Statistics
-from twincal._table import Assessment, Table
-from twincal._twincal import version as _version
-from twincal.errors import Error
-
 if TYPE_CHECKING:
-    from twincal import fleet, plot
+    from twincal import errors, fleet, plot
+    from twincal._calibration import Calibration, Draws, LogTorque, Torque, fit
+    from twincal._decoys import decoys
+    from twincal._design import Motion, design
+    from twincal._log import Log
+    from twincal._robot import Robot
+    from twincal._statistics import Plan, Statistics
+    from twincal._table import Assessment, Table
+    from twincal.errors import Error
     from twincal.regressor import SpikeSlabRegressor
 
-__version__ = _version()
+    __version__: str
+
+# The module of each name, imported when the name is first used: the command `twincal` needs none of
+# them, and NumPy alone takes a fifth of a second.
+_MODULE_OF = {
+    "Assessment": "_table",
+    "Calibration": "_calibration",
+    "Draws": "_calibration",
+    "Error": "errors",
+    "Log": "_log",
+    "LogTorque": "_calibration",
+    "Motion": "_design",
+    "Plan": "_statistics",
+    "Robot": "_robot",
+    "SpikeSlabRegressor": "regressor",
+    "Statistics": "_statistics",
+    "Table": "_table",
+    "Torque": "_calibration",
+    "decoys": "_decoys",
+    "design": "_design",
+    "fit": "_calibration",
+}
 
 __all__ = [
     "Assessment",
@@ -66,15 +84,19 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """Imports what needs other packages when it is first used."""
-    import importlib
+    from importlib import import_module
 
-    if name == "SpikeSlabRegressor":
-        return importlib.import_module("twincal.regressor").SpikeSlabRegressor
-    if name in ("fleet", "plot"):
-        return importlib.import_module(f"twincal.{name}")
-    raise AttributeError(f"module 'twincal' has no attribute {name!r}")
+    if name in _MODULE_OF:
+        value = getattr(import_module(f"twincal.{_MODULE_OF[name]}"), name)
+    elif name in ("errors", "fleet", "plot"):
+        value = import_module(f"twincal.{name}")
+    elif name == "__version__":
+        value = import_module("twincal._twincal").version()
+    else:
+        raise AttributeError(f"module 'twincal' has no attribute {name!r}")
+    globals()[name] = value
+    return value
 
 
 def __dir__() -> list[str]:
-    return sorted([*globals(), "SpikeSlabRegressor", "fleet", "plot"])
+    return sorted({*globals(), *__all__, "__version__"})

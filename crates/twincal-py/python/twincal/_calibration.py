@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from twincal import _twincal
+from twincal import _twincal, errors
 from twincal._arrays import Floats, as_json, states, whole
 from twincal._log import Log
 from twincal._robot import Robot
@@ -213,7 +213,13 @@ class Calibration:
         self._calibration.save(os.fspath(path), force)
 
     def to_json(self) -> str:
-        """The text of result.json."""
+        """The result as a program reads it.
+
+        Returns
+        -------
+        str
+            The text of result.json, as `save` writes it.
+        """
         return self._calibration.result_json()
 
     def report(self, path: str | os.PathLike[str] | None = None) -> str:
@@ -228,11 +234,21 @@ class Calibration:
         -------
         str
             The page.
+
+        Raises
+        ------
+        twincal.errors.SystemError
+            For a file that cannot be written.
         """
+        place = None if path is None else os.fspath(path)
         page = self._calibration.html()
-        if path is not None:
-            with open(path, "w", encoding="utf-8") as file:
-                file.write(page)
+        if place is not None:
+            try:
+                with open(place, "w", encoding="utf-8") as file:
+                    file.write(page)
+            except OSError as error:
+                problem = f"{place}: cannot be written: {error.strerror}"
+                raise errors.SystemError(problem, "give the path of a file") from None
         return page
 
     # ---- tables
@@ -376,7 +392,8 @@ class Calibration:
         Parameters
         ----------
         log : Log
-            Positions over time; torque is not needed.
+            Positions over time; torque is not needed. It is read as by `fit`: `columns`, `payload`
+            and the other keys of the log hold.
 
         Returns
         -------
@@ -387,9 +404,9 @@ class Calibration:
         twincal.Error
             For a log that cannot be used.
         """
-        with self._folder() as twin, _files(logs_of("log", log)) as paths:
+        with self._folder() as twin, _files(logs_of("log", log)) as files:
             place = twin + ".csv"
-            _twincal.call(["predict", *paths, "--twin", twin, "--output", place])
+            _twincal.call(["predict", "--twin", twin, "--output", place, *files])
             with open(place, encoding="utf-8", newline="") as file:
                 next(csv.reader(file))  # names, which may hold line feeds
                 text = file.read()
@@ -407,6 +424,7 @@ class Calibration:
         Parameters
         ----------
         logs : Log or sequence of Log
+            Read as by `fit`: `columns`, `payload` and the other keys of each log hold.
 
         Returns
         -------
@@ -418,8 +436,8 @@ class Calibration:
         twincal.Error
             For logs that cannot be used.
         """
-        with self._folder() as twin, _files(logs_of("logs", logs)) as paths:
-            return _run(["check", *paths, "--twin", twin, "--json"])[1]
+        with self._folder() as twin, _files(logs_of("logs", logs)) as files:
+            return _run(["check", "--twin", twin, "--json", *files])[1]
 
     def diff(self, other: Calibration) -> dict[str, Any]:
         """What changed from this twin to another one of the same robot, as `twincal diff` says it.
@@ -501,15 +519,31 @@ def _run(arguments: list[str]) -> tuple[int, dict[str, Any]]:
 
 @contextmanager
 def _files(logs: list[Log]) -> Iterator[list[str]]:
-    """Logs as files; those in memory are written for as long as it takes."""
+    """Last arguments of a command that reads logs: how they are read, then their paths.
+
+    Logs in memory are written for as long as it takes.
+    """
     from tempfile import TemporaryDirectory
 
     with TemporaryDirectory(prefix="twincal-") as folder:
-        paths = []
+        paths, read_as = [], []
         for number, log in enumerate(logs):
             path = log.path
             if path is None:
                 path = os.path.join(folder, f"{number}.npz")
-                np.savez(path, allow_pickle=False, **dict(log._log.in_memory()))
+                np.savez(path, allow_pickle=False, **_arrays(log))
             paths.append(path)
-        yield paths
+            # Paths in a config are relative to its folder.
+            place = os.path.abspath(path)
+            read_as.append(_twincal.Log.file(place, log._log.entry, log._log.columns))
+        config = os.path.join(folder, "twincal.toml")
+        with open(config, "w", encoding="utf-8") as file:
+            file.write(_twincal.log_settings(read_as))
+        yield ["--config", config, "--", *paths]
+
+
+def _arrays(log: Log) -> dict[str, npt.NDArray[Any]]:
+    """Columns of a log in memory by name; those that hold no numbers as text, which readers refuse."""
+    own: dict[str, npt.NDArray[Any]] = dict(log._log.in_memory())
+    rows = max((len(values) for values in own.values()), default=0)
+    return own | {name: np.full(rows, what) for name, what in log._log.others()}

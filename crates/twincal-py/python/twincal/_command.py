@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 
 
@@ -13,6 +14,8 @@ def main() -> int:
     int
         Its exit code.
     """
+    # Until the program listens itself, Ctrl-C ends the process without a traceback.
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
     from twincal import _twincal
 
     return _twincal.command(["twincal", *sys.argv[1:]])

@@ -53,7 +53,8 @@ class Log:
         payload: Mapping[str, Any] | str | None = None,
     ) -> None:
         columns = _columns(time, (q, tau, qd, qdd), names)
-        self._log = _twincal.Log.arrays(_text("name", name), columns, _entry(payload=payload), "{}")
+        own = _entry(payload=payload)
+        self._log = _twincal.Log.arrays(_text("name", name), columns, [], own, "{}")
 
     @classmethod
     def _of(cls, log: _twincal.Log) -> Log:
@@ -119,7 +120,9 @@ class Log:
     ) -> Log:
         """A log in a data frame of pandas, polars, pyarrow or DuckDB.
 
-        Columns are named as in files: `t`, `q1` …, `tau1` … or `elbow.q`, `elbow.tau`.
+        Columns are named as in files: `t`, `q1` …, `tau1` … or `elbow.q`, `elbow.tau`. Types are
+        those of Parquet files: whole numbers, floats, decimals, and time stamps with their unit.
+        Columns of other types are passed over, unless a channel has their name: then `fit` refuses.
 
         Parameters
         ----------
@@ -150,13 +153,13 @@ class Log:
                 (_text("a column's name", key), np.ravel(floats(f"column {key!r}", frame[key])))
                 for key in frame
             ]
-            return cls._of(_twincal.Log.arrays(name, named, own, said))
+            return cls._of(_twincal.Log.arrays(name, named, [], own, said))
         raise TypeError(f"{type(frame).__name__} is no table; give a data frame with Arrow support")
 
     def __reduce__(self) -> tuple[Any, ...]:
         log = self._log
         path = self.path
-        columns = log.in_memory() if path is None else None
+        columns = (log.in_memory(), log.others()) if path is None else None
         return (_restored, (path or log.name, columns, log.entry, log.columns))
 
     @property
@@ -175,12 +178,15 @@ class Log:
 
 
 def _restored(
-    name: str, columns: list[tuple[str, Any]] | None, entry: str, said: str
+    name: str,
+    columns: tuple[list[tuple[str, Any]], list[tuple[str, str]]] | None,
+    entry: str,
+    said: str,
 ) -> Log:
-    """A log that was pickled."""
+    """A log that was pickled; `columns` are those with numbers and the others."""
     if columns is None:
         return Log._of(_twincal.Log.file(name, entry, said))
-    return Log._of(_twincal.Log.arrays(name, columns, entry, said))
+    return Log._of(_twincal.Log.arrays(name, *columns, entry, said))
 
 
 def _has(module: str) -> bool:

@@ -75,7 +75,24 @@ class Robot:
 
     @classmethod
     def from_mjcf(cls, path: str | os.PathLike[str], **settings: Any) -> Robot:
-        """Reads an MJCF file; parameters, result and errors are those of `from_urdf`."""
+        """Reads an MJCF file.
+
+        Parameters
+        ----------
+        path : path
+            The file; meshes are not opened.
+        **settings
+            As in `from_urdf`.
+
+        Returns
+        -------
+        Robot
+
+        Raises
+        ------
+        twincal.errors.ContentError, twincal.errors.SettingError
+            As `from_urdf`.
+        """
         return cls._make(os.fspath(path), None, as_json(settings))
 
     @classmethod

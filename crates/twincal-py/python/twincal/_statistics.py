@@ -18,6 +18,8 @@ class Plan:
     """How logs of one robot become statistics: filters, rates, candidates. Made by `Statistics.plan`."""
 
     def __init__(self, plan: _twincal.Plan) -> None:
+        if not isinstance(plan, _twincal.Plan):
+            raise TypeError("a Plan is made by Statistics.plan")
         self._plan = plan
 
     def __repr__(self) -> str:
@@ -37,6 +39,8 @@ class Statistics:
     """
 
     def __init__(self, statistics: _twincal.Statistics) -> None:
+        if not isinstance(statistics, _twincal.Statistics):
+            raise TypeError("Statistics are made by Statistics.map, merge or read")
         self._statistics = statistics
 
     @staticmethod
@@ -131,11 +135,38 @@ class Statistics:
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> Statistics:
-        """Reads a file that `write` or `twincal statistics` wrote."""
+        """Reads a file that `write` or `twincal statistics` wrote.
+
+        Parameters
+        ----------
+        path : path
+
+        Returns
+        -------
+        Statistics
+
+        Raises
+        ------
+        twincal.errors.SystemError, twincal.errors.ContentError
+            For a file that cannot be read, is damaged, or of another format.
+        """
         return cls(_twincal.Statistics.read(os.fspath(path)))
 
     def write(self, path: str | os.PathLike[str], *, force: bool = False) -> None:
-        """Writes a file, complete or not at all; with `force` over an earlier one."""
+        """Writes a file, complete or not at all.
+
+        Parameters
+        ----------
+        path : path
+            A file that is not there yet.
+        force : bool
+            Replace an earlier one.
+
+        Raises
+        ------
+        twincal.errors.SystemError, twincal.errors.ContentError
+            For a file that is there, or cannot be written.
+        """
         self._statistics.write(os.fspath(path), force)
 
     @property

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from twincal._arrays import floats
+from twincal._arrays import Floats, floats, whole
 from twincal._calibration import Calibration
 
 if TYPE_CHECKING:
@@ -19,23 +19,48 @@ _BLUE, _ORANGE, _GREY = "#0072B2", "#D55E00", "#999999"
 
 
 def _axes(ax: Axes | None) -> Axes:
-    if ax is not None:
-        return ax
     from matplotlib import pyplot
+    from matplotlib.axes import Axes
 
-    made: Axes = pyplot.subplots()[1]
-    return made
+    if ax is None:
+        made: Axes = pyplot.subplots()[1]
+        return made
+    if not isinstance(ax, Axes):
+        raise TypeError(f"ax is of {type(ax).__name__}; give Axes of matplotlib")
+    return ax
+
+
+def _require(calibration: Calibration) -> None:
+    if not isinstance(calibration, Calibration):
+        raise TypeError(f"calibration is of {type(calibration).__name__}; give a twincal.Calibration")
 
 
 def _joint(calibration: Calibration, joint: int | str) -> int:
+    _require(calibration)
     names = calibration.joint_names
     if isinstance(joint, str):
         if joint not in names:
             raise ValueError(f"there is no joint {joint!r}; joints are {', '.join(names)}")
         return names.index(joint)
-    if not 0 <= joint < len(names):
-        raise ValueError(f"there is no joint {joint}; there are {len(names)}")
-    return joint
+    number = whole("joint", joint)
+    if number >= len(names):
+        raise ValueError(f"there is no joint {number}; there are {len(names)}, counted from 0")
+    return number
+
+
+def _samples(
+    calibration: Calibration, rows: int | None, **channels: npt.ArrayLike
+) -> list[Floats]:
+    """Channels of all joints, shape (N, n) each; `rows`: N, where it is known."""
+    own, joints = [], len(calibration.joint_names)
+    for name, values in channels.items():
+        array = floats(name, values)
+        rows = len(array) if rows is None and array.ndim == 2 else rows
+        if array.shape != (rows, joints):
+            wanted = "samples" if rows is None else rows
+            raise ValueError(f"{name} has shape {array.shape}; give ({wanted}, {joints})")
+        own.append(array)
+    return own
 
 
 def pip(calibration: Calibration, *, most: int = 20, ax: Axes | None = None) -> Axes:
@@ -52,7 +77,8 @@ def pip(calibration: Calibration, *, most: int = 20, ax: Axes | None = None) -> 
     -------
     matplotlib.axes.Axes
     """
-    ax = _axes(ax)
+    _require(calibration)
+    ax, most = _axes(ax), whole("most", most)
     effects = calibration.effects.to_dict()
     found = {
         name: float(value)
@@ -100,7 +126,10 @@ def torque(
     """
     own = _joint(calibration, joint)
     stamps = floats("time", time)
-    predicted = calibration.predict(q, qd, qdd)
+    if stamps.ndim != 1:
+        raise ValueError(f"time has shape {stamps.shape}; give one stamp per sample")
+    predicted = calibration.predict(*_samples(calibration, len(stamps), q=q, qd=qd, qdd=qdd))
+    measured = [] if tau is None else _samples(calibration, len(stamps), tau=tau)
     ax = _axes(ax)
     ax.fill_between(
         stamps,
@@ -112,8 +141,8 @@ def torque(
         label="95 % interval",
     )
     ax.plot(stamps, predicted.mean[:, own], color=_BLUE, label="calibrated")
-    if tau is not None:
-        ax.plot(stamps, floats("tau", tau)[:, own], color=_ORANGE, linewidth=0.8, label="measured")
+    for values in measured:
+        ax.plot(stamps, values[:, own], color=_ORANGE, linewidth=0.8, label="measured")
     ax.set_xlabel("time [s]")
     ax.set_ylabel(_label(calibration, own, "torque"))
     ax.legend()
@@ -145,10 +174,10 @@ def residual(
     matplotlib.axes.Axes
     """
     own = _joint(calibration, joint)
-    mean = calibration.predict(q, qd, qdd).mean
-    left = floats("tau", tau) - mean
+    *states, measured = _samples(calibration, None, q=q, qd=qd, qdd=qdd, tau=tau)
+    left = measured - calibration.predict(*states).mean
     ax = _axes(ax)
-    ax.plot(floats("q", q)[:, own], left[:, own], ".", markersize=2, color=_BLUE)
+    ax.plot(states[0][:, own], left[:, own], ".", markersize=2, color=_BLUE)
     ax.axhline(0.0, color="black", linewidth=0.8)
     ax.set_xlabel(_motion_label(calibration, own, "position"))
     ax.set_ylabel(_label(calibration, own, "residual torque"))
@@ -178,6 +207,7 @@ def pair(
     -------
     matplotlib.axes.Axes
     """
+    _require(calibration)
     drawn = calibration.draws(draws, seed=seed)
     for name in (x, y):
         if name not in drawn.terms:
@@ -211,6 +241,8 @@ def law(
     ValueError
         Where no such law was found.
     """
+    if along not in ("velocity", "position"):
+        raise ValueError(f"along is {along!r}; give 'velocity' or 'position'")
     name = calibration.joint_names[_joint(calibration, joint)]
     curves = calibration._calibration.curves()
     own = [curve for curve in curves if curve[0] == name and curve[1] == along]

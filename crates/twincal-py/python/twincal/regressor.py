@@ -43,7 +43,8 @@ class SpikeSlabRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
     noise : {"iid", "ar1", "tempered", "decoys"}
         Independent rows; first-order autoregression; independent rows that count by the
         autocorrelation time of the residual; the same, or by what is left along the decoys of
-        `fit` where that is more, so that what no column describes counts as noise.
+        `fit` where that is more, so that what no column describes counts as noise. With "decoys"
+        `fit` then requires `decoys`; `check_estimator` of scikit-learn gives none, and fails.
     method : {"auto", "exact", "gibbs"}
         How the posterior is computed.
     groups : array_like of int, shape (n_features,), optional
@@ -56,8 +57,10 @@ class SpikeSlabRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         Prior probability of each group, instead of `expected_terms`.
     fit_intercept : bool
         A constant b with a flat prior.
-    chains, draws : int
-        Of the Gibbs sampler; draws after warm-up in each chain.
+    chains : int
+        Chains of the Gibbs sampler, 2 to 1024.
+    draws : int
+        Draws after warm-up in each chain, 100 to 10⁷.
     random_state : int, RandomState or None
         The same number gives the same result.
 
@@ -137,6 +140,10 @@ class SpikeSlabRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         ------
         ValueError
             For arrays and parameters that do not fit together.
+        twincal.errors.SettingError
+            For `chains` or `draws` out of their range.
+        twincal.errors.ContentError
+            For more draws than the memory holds.
         """
         checked: tuple[Floats, Floats] = validate_data(
             self, X, y, dtype=np.float64, y_numeric=True, ensure_min_samples=2
@@ -188,7 +195,27 @@ class SpikeSlabRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         return (mean, std) if return_std else mean
 
     def sample(self, n: int = 1000, *, seed: int = 1) -> Floats:
-        """Independent draws of β from the posterior, shape (n, n_features)."""
+        """Independent draws of β from the posterior.
+
+        Parameters
+        ----------
+        n : int
+            How many.
+        seed : int
+            The same seed gives the same draws.
+
+        Returns
+        -------
+        ndarray, shape (n, n_features)
+            Units of y per unit of the column; exactly 0 where the column is out.
+
+        Raises
+        ------
+        ValueError
+            For a negative number.
+        twincal.errors.ContentError
+            For more draws than the memory holds.
+        """
         check_is_fitted(self)
         count = whole("n", n)
         drawn = self.regression_.draws(count, whole("seed", seed))
@@ -218,7 +245,7 @@ class SpikeSlabRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         asked.scaled_variance = self.scaled_variance
         asked.expected_terms = self.expected_terms
         asked.probability = self.probability
-        asked.chains, asked.draws = self.chains, self.draws
+        asked.chains, asked.draws = whole("chains", self.chains), whole("draws", self.draws)
         asked.seed = int(check_random_state(self.random_state).randint(2**31 - 1))
         asked.intercept = self.fit_intercept
         return asked

@@ -9,7 +9,7 @@ use twincal::words::significant;
 use twincal_io::Error;
 use twincal_io::words::probability;
 
-const TRUTH: &str = include_str!("../../../../../studies/planar_arm/assets/truth.json");
+const TRUTH: &str = include_str!("../../../assets/truth.json");
 /// Distance of a number from the truth, in spreads, that is said.
 const FAR: f64 = 3.0;
 /// Columns before what was found.
