@@ -431,20 +431,16 @@ fn odd_numbers_in_a_plan_are_refused() {
 fn torque_of_another_unit_is_refused_with_its_log() {
     let study = study(1);
     let plan = study.plan();
-    for (joints, words) in [
-        (0..2, "the torque of joint `shoulder` is"),
-        (0..1, "the torque of joint `shoulder` is"),
-        (1..2, "the torque of joint `elbow` is"),
-    ] {
+    let of = |joints: std::ops::Range<usize>| {
         let mut loud = study.logs[0].clone();
         for joint in &mut loud.joints[joints] {
             joint.tau.iter_mut().flatten().for_each(|tau| *tau *= 1e6);
         }
-        let own = Statistics::of(("arm", &study.robot), &plan, &Log::from(&loud), "");
-        refused(own, "log `log0`: the torque of");
-        let own = Statistics::of(("arm", &study.robot), &plan, &Log::from(&loud), "");
-        refused(own, words);
-    }
+        Statistics::of(("arm", &study.robot), &plan, &Log::from(&loud), "")
+    };
+    refused(of(0..2), "log `log0`: the torque of");
+    // The model may have a wrong mass behind a single joint: that is a finding.
+    assert!(of(0..1).is_ok() && of(1..2).is_ok());
 }
 
 /// A held-out log that is a fitted one, cut and rounded, is named; one of the same hours is refused.

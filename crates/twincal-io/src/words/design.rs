@@ -298,8 +298,6 @@ mod tests {
         assert!(text.contains("m of tool0. Its shape"), "{text}");
     }
 
-    /// Effects between 0.05 and 0.95, where the regression is at hand and nothing doubts the log.
-    #[cfg(feature = "report")]
     fn limits(joint: &str, assumed: &[&'static str]) -> JointLimits {
         JointLimits {
             joint: joint.into(),

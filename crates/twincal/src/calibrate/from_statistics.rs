@@ -34,7 +34,7 @@ use crate::likelihood::{Columns, Spread};
 use crate::posterior::Posterior;
 use crate::robot::Robot;
 use crate::self_check::self_check;
-use crate::signal::{Log, Logs, ReadyLog, less_driven, ready, torque_rms};
+use crate::signal::{Log, Logs, ReadyLog, less_driven, ready};
 use crate::statistics::{Purpose, Sums, residual_form};
 use crate::term::Library;
 use crate::twin::Twin;
@@ -99,13 +99,15 @@ fn road(
     let (robot, plan) = (&statistics.robot, &statistics.plan);
     plan.require_for(robot)?;
     require_even_rows(settings)?;
-    require_like(statistics)?;
+    // Of a robot among others the fleet has said it.
+    if pooled.is_none() {
+        require_like(statistics)?;
+    }
     let mut settings = settings.clone();
     settings.library = plan.library.clone();
     settings.noise.model = plan.noise;
     progress(Stage::Rows)?;
     let known = known((statistics, pooled), &settings, findings)?;
-    progress(Stage::Inference)?;
     let Known {
         library,
         columns,
@@ -113,6 +115,9 @@ fn road(
         facts,
         ..
     } = &known;
+    let (data, trajectories) = held_out_rows(statistics, library, heldout)?;
+    findings.extend(compared(statistics, (heldout, &data))?);
+    progress(Stage::Inference)?;
     let fitted = match pooled {
         None => estimated((robot, sums, columns), &settings, findings)?,
         Some(pooled) => pooled.fitted((robot, sums, columns), &settings, findings)?,
@@ -129,8 +134,6 @@ fn road(
         compact: &compact,
         fit,
     };
-    let (data, trajectories) = held_out_rows(statistics, library, heldout)?;
-    findings.extend(compared(statistics, (heldout, &data))?);
     findings.extend(data.findings.iter().cloned());
     let pipeline = &statistics.plan.pipeline;
     findings.extend(self_check(robot, pipeline, trajectories.heldout.iter())?);
@@ -320,13 +323,8 @@ fn compared(statistics: &Statistics, (heldout, data): (&Logs<'_>, &Data)) -> Res
     let named = heldout.0.iter().map(Log::name).zip(&noise);
     let known = fitted().map(|log| (log.name(), &log.noise));
     let mut findings = sketched_copies(&known.chain(named).collect::<Vec<_>>());
-    let mut sizes: Vec<(String, Vec<Option<f64>>)> = fitted()
-        .map(|log| (log.name().to_owned(), log.torque_rms()))
-        .collect();
-    for log in &heldout.0 {
-        sizes.push((log.name().to_owned(), torque_rms(log)?));
-    }
-    findings.extend(less_driven(robot, &sizes));
+    let sizes = fitted().map(|log| (log.name().to_owned(), log.torque_rms()));
+    findings.extend(less_driven(robot, &sizes.collect::<Vec<_>>()));
     Ok(findings)
 }
 

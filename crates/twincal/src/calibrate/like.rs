@@ -14,8 +14,10 @@ const MOVES: f64 = 0.1;
 /// Size of each joint's torque in a log.
 struct Sizes<'a> {
     log: &'a str,
-    /// Root mean square, N·m or N; `None` for a joint that hardly moves.
+    /// Root mean square, N·m or N; `None` for a joint without torque.
     rms: Vec<Option<f64>>,
+    /// Where the joint moves.
+    moves: Vec<bool>,
 }
 
 /// Torque that the other logs contradict.
@@ -28,26 +30,28 @@ struct Odd {
 impl<'a> Sizes<'a> {
     fn of(log: &'a LogStatistics) -> Self {
         let rows = log.sums.rows.iter().sum::<usize>() as f64;
-        let joints = log.sums.joints.iter().zip(log.torque_rms());
-        let rms = joints.map(|(joint, rms)| {
+        let moves = log.sums.joints.iter().map(|joint| {
             let moving: f64 = joint.blocks.iter().map(|own| own.gram.n).sum();
-            rms.filter(|rms| moving > MOVES * rows && *rms > 0.0)
+            moving > MOVES * rows
         });
+        let rms = log.torque_rms().into_iter();
         Self {
             log: log.name(),
-            rms: rms.collect(),
+            rms: rms.map(|rms| rms.filter(|rms| *rms > 0.0)).collect(),
+            moves: moves.collect(),
         }
     }
 
-    /// What is odd against the usual torque of each joint: the median of all logs, or that of the other one of a `pair`.
-    fn odd(&self, usual: &[Option<f64>], pair: bool) -> Option<Odd> {
-        let ratio = |joint: usize| Some((joint, self.rms[joint]? / usual[joint]?));
+    /// What is odd against the usual torque of each joint: the median of all logs, or that of the other one of a `pair`. All joints count
+    /// together, those that hold a weight as well; one alone only where it moves.
+    fn odd(&self, usual: &Usual, pair: bool) -> Option<Odd> {
+        let ratio = |joint: usize| Some((joint, self.rms[joint]? / usual.all[joint]?));
         let ratios: Vec<(usize, f64)> = (0..self.rms.len()).filter_map(ratio).collect();
         // The larger one of two is named.
         let beyond = |ratio: f64, limit: f64| ratio > limit || !pair && ratio < 1.0 / limit;
         let one_way = |large: bool| ratios.iter().all(|(_, ratio)| (*ratio > 1.0) == large);
         let all_odd = ratios.iter().all(|(_, ratio)| beyond(*ratio, ODD));
-        if !ratios.is_empty() && all_odd && (one_way(true) || one_way(false)) {
+        if ratios.len() > 1 && all_odd && (one_way(true) || one_way(false)) {
             let mean =
                 ratios.iter().map(|(_, ratio)| ratio.ln()).sum::<f64>() / ratios.len() as f64;
             return Some(Odd {
@@ -55,13 +59,42 @@ impl<'a> Sizes<'a> {
                 joint: None,
             });
         }
-        let odd = ratios
-            .into_iter()
+        let moving = |joint: usize| {
+            let rms = self.rms[joint].filter(|_| self.moves[joint])?;
+            Some((joint, rms / usual.moving[joint]?))
+        };
+        let odd = (0..self.rms.len())
+            .filter_map(moving)
             .find(|(_, ratio)| beyond(*ratio, ODD_JOINT));
         odd.map(|(joint, times)| Odd {
             times,
             joint: Some(joint),
         })
+    }
+}
+
+/// Usual torque of each joint, of all logs with torque and of those in which it moves.
+struct Usual {
+    all: Vec<Option<f64>>,
+    moving: Vec<Option<f64>>,
+}
+
+impl Usual {
+    /// Medians over these logs.
+    fn of(logs: &[&Sizes<'_>], joints: usize) -> Self {
+        let medians = |counts: &dyn Fn(&Sizes<'_>, usize) -> bool| {
+            let median = |joint: usize| {
+                let own = logs.iter().filter(|own| counts(own, joint));
+                let mut sizes: Vec<f64> = own.filter_map(|own| own.rms[joint]).collect();
+                sizes.sort_by(f64::total_cmp);
+                sizes.get(sizes.len() / 2).copied()
+            };
+            (0..joints).map(median).collect()
+        };
+        Self {
+            all: medians(&|_, _| true),
+            moving: medians(&|own, joint| own.moves[joint]),
+        }
     }
 }
 
@@ -84,24 +117,17 @@ pub(super) fn require_like(statistics: &Statistics) -> Result<()> {
     })
 }
 
-/// Median of each joint's torque over all logs.
-fn medians(all: &[Sizes<'_>], joints: usize) -> Vec<Option<f64>> {
-    let median = |joint: usize| {
-        let mut sizes: Vec<f64> = all.iter().filter_map(|own| own.rms[joint]).collect();
-        sizes.sort_by(f64::total_cmp);
-        sizes.get(sizes.len() / 2).copied()
-    };
-    (0..joints).map(median).collect()
-}
-
 /// The first log whose torque is odd, and against what.
 fn problem(all: &[Sizes<'_>], joints: &[&str]) -> Option<String> {
     let (own, odd) = match all {
         [one, other] => [(one, other), (other, one)]
             .into_iter()
-            .find_map(|(own, other)| Some((own, own.odd(&other.rms, true)?)))?,
+            .find_map(|(own, other)| {
+                let usual = Usual::of(&[other], joints.len());
+                Some((own, own.odd(&usual, true)?))
+            })?,
         _ => {
-            let usual = medians(all, joints.len());
+            let usual = Usual::of(&all.iter().collect::<Vec<_>>(), joints.len());
             all.iter()
                 .find_map(|own| Some((own, own.odd(&usual, false)?)))?
         }
@@ -136,6 +162,7 @@ mod tests {
         let sizes = |(log, rms): (&'static str, &[f64; 2])| Sizes {
             log,
             rms: rms.iter().map(|rms| (*rms > 0.0).then_some(*rms)).collect(),
+            moves: vec![true; 2],
         };
         let all: Vec<Sizes<'_>> = names.into_iter().zip(logs).map(sizes).collect();
         assert_eq!(problem(&all, &["hip", "knee"]).as_deref(), wanted);
@@ -162,6 +189,18 @@ mod tests {
         said(&with([3e-6, 1.0]), Some(wanted));
         let wanted = "the torque of log `c` is 1.5e6 times that of the others on joint `knee`";
         said(&with([3.0, 3e6]), Some(wanted));
+    }
+
+    /// A joint that turns slowly in one log and fast in the other, beside one that holds a weight in both.
+    #[test]
+    fn a_joint_that_holds_a_weight_says_that_the_unit_is_one() {
+        let log = |log: &'static str, yaw: f64| Sizes {
+            log,
+            rms: vec![Some(yaw), Some(30.0)],
+            moves: vec![true, false],
+        };
+        let all = [log("slow", 0.1), log("fast", 31.5)];
+        assert_eq!(problem(&all, &["yaw", "pitch"]), None);
     }
 
     /// A heavy load, a joint that stands still, and logs of which none has the torque of another.

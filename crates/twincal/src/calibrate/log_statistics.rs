@@ -251,29 +251,40 @@ pub(super) fn require_read_back(log: &signal::Log<'_>) -> Result<()> {
 
 /// Factor between measured and nominal torque which is a unit and not a gear: N·mm is 1000, gears go to 300.
 const UNIT: f64 = 400.0;
+/// Ratio of the factors of two joints up to which they have one unit; a single joint may as well have a wrong mass in the model.
+const ONE_UNIT: f64 = 2.5;
 
 /// # Errors
-/// [`Error::Log`] for torque of a unit that no finding makes usable.
+/// [`Error::Log`] for torque of another unit, on all joints or alike on two and more.
 fn require_unit(log: &str, compared: &Look) -> Result<()> {
     let odd = |times: f64| !(1.0 / UNIT..=UNIT).contains(&times);
-    let Some((joint, times)) = compared.sizes.iter().find(|(_, times)| odd(*times)) else {
-        return Ok(());
-    };
-    // The column that is read as this joint's torque: it may be another one's.
+    let odd: Vec<&(Option<String>, f64)> = (compared.sizes.iter())
+        .filter(|(_, times)| odd(*times))
+        .collect();
+    let sizes = || odd.iter().map(|(_, times)| *times);
+    let (least, most) = (
+        sizes().fold(f64::INFINITY, f64::min),
+        sizes().fold(0.0, f64::max),
+    );
+    // The column that is read as a joint's torque: it may be another one's.
     let column = |joint: &String| {
         let mut checks = compared.joints.iter();
         let own = checks.find(|own| own.joint == *joint);
         own.map_or_else(|| joint.clone(), |own| own.torque.0.clone())
     };
-    let joints = match joint {
-        Some(joint) => format!("joint `{}`", column(joint)),
-        None => "all joints".into(),
+    let named: Vec<String> = (odd.iter())
+        .filter_map(|(joint, _)| joint.as_ref().map(column))
+        .collect();
+    let joints = match (odd.len() - named.len(), named.len()) {
+        (1.., _) => "all joints".into(),
+        (0, 2..) if most <= ONE_UNIT * least => format!("joints {}", quoted(&named)),
+        _ => return Ok(()),
     };
     Err(Error::Log {
         log: log.to_owned(),
         problem: format!(
             "the torque of {joints} is {} times the model's, which is another unit",
-            significant(*times, 3)
+            significant(most, 3)
         ),
         remedy: "give what makes N·m of it in [columns.factor] tau, or what the column holds in [[log]] torque".into(),
     })

@@ -6,7 +6,7 @@ use super::fit::relinearise;
 use super::request::{Recorded, Request};
 use super::settings::CalibrationSettings;
 use super::stages;
-use crate::error::{Error, Finding, Result};
+use crate::error::{Code, Error, Finding, Result};
 use crate::likelihood::NoiseModel;
 use crate::robot::Robot;
 use crate::signal::{Logs, Pipeline};
@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use std::fmt::Write as _;
 
 /// Version of what statistics hold and mean.
-pub const VERSION: u32 = 1;
+pub const VERSION: u32 = 2;
 
 /// How logs become statistics, chosen once: by a fit to some of the logs, [`plan`](super::plan).
 ///
@@ -95,6 +95,12 @@ impl Plan {
     }
 }
 
+/// Without what is said of the plan's logs alone: others may move what these do not.
+fn about_filters(mut findings: Vec<Finding>) -> Vec<Finding> {
+    findings.retain(|finding| finding.code != Code::JointNotExcited);
+    findings
+}
+
 /// Checksum of a robot.
 fn checksum(robot: &Robot) -> u64 {
     let mut sum = Fnv::new();
@@ -140,7 +146,7 @@ pub(super) fn road(
         payload_where_unknown: rows.prepared.unknown,
         pipeline: rows.prepared.pipeline,
         library: rows.prepared.library_settings,
-        findings: rows.prepared.of_pipeline,
+        findings: about_filters(rows.prepared.of_pipeline),
     })
 }
 

@@ -8,6 +8,7 @@ use crate::random::Random;
 use crate::rigid_body::Found;
 use crate::robot::{PARAMETERS, Robot, base_parameters, inertia_of, principal_axes};
 use crate::term::{Library, ModelColumn};
+use crate::words::significant;
 
 /// Draws that are looked at.
 const DRAWS: usize = 1000;
@@ -31,8 +32,8 @@ pub(in crate::calibrate) struct Unphysical {
     finding: Finding,
     /// Share of the draws that are those of a rigid body.
     share: f64,
-    /// Chance that a rigid body is found as far from every one; `None` where rounding hides it.
-    chance: Option<f64>,
+    /// Chance that a rigid body is found as far from every one.
+    chance: f64,
     /// What was found of it.
     components: Vec<usize>,
 }
@@ -98,6 +99,8 @@ pub(in crate::calibrate) fn findings(
             let hidden = PARAMETERS.map(|own| !whole && hidden.contains(&format!("{name}.{own}")));
             let mut random = Random::new(seed, CHANCES + body as u64);
             let chance = found(&drawn, nominal, hidden).chance(&mut random);
+            // Where rounding hides it the draws decide.
+            let chance = chance.unwrap_or(share);
             let of_column = |(column, _): &(usize, [f64; 10])| {
                 library.terms()[library.columns()[*column]].component
             };
@@ -127,8 +130,8 @@ pub(in crate::calibrate) fn tell(calibration: &mut Calibration, unphysical: Vec<
         for component in components {
             let own = &mut calibration.components[component];
             own.rigid_share = Some(share);
-            if let Some(chance) = contradicts(chance) {
-                own.no_rigid_body = true;
+            own.no_rigid_body = chance < CONTRADICTS;
+            if own.no_rigid_body {
                 (own.status, own.reason) =
                     (Status::Tentative, StatusReason::NoRigidBody { chance });
                 own.words.push_str(NO_BODY);
@@ -136,11 +139,6 @@ pub(in crate::calibrate) fn tell(calibration: &mut Calibration, unphysical: Vec<
         }
         calibration.findings.push(finding);
     }
-}
-
-/// The chance where it is one that contradicts.
-fn contradicts(chance: Option<f64>) -> Option<f64> {
-    chance.filter(|chance| *chance < CONTRADICTS)
 }
 
 /// What the draws say of the body's parameters.
@@ -163,8 +161,8 @@ fn found(drawn: &[[f64; 10]], nominal: [f64; 10], hidden: [bool; 10]) -> Found {
     }
 }
 
-fn finding(link: &str, share: f64, chance: Option<f64>) -> Finding {
-    let (severity, remedy) = if contradicts(chance).is_some() {
+fn finding(link: &str, share: f64, chance: f64) -> Finding {
+    let (severity, remedy) = if chance < CONTRADICTS {
         (
             Severity::Warning,
             "torque is predicted as measured, but do not read these numbers as a body: either these logs show its tensor \
@@ -181,9 +179,10 @@ fn finding(link: &str, share: f64, chance: Option<f64>) -> Finding {
         Code::UnphysicalInertiaFound,
         link,
         format!(
-            "link `{link}`: {:.1} % of the posterior draws of its inertia (with what it carries) are those of a rigid body; \
+            "link `{link}`: {:.1} % of the posterior draws of its inertia (with what it carries) are those of a rigid body (p-value {}); \
              {remedy}",
-            100.0 * share
+            100.0 * share,
+            significant(chance, 2)
         ),
         0,
     )
