@@ -119,11 +119,10 @@ pub(super) fn run(flags: &Check, terminal: &mut Terminal) -> Outcome<u8> {
         let failed = gates.iter().filter(|gate| !gate.passed);
         failed.for_each(|gate| paragraph(&gate.words, terminal));
         // The gates hold: what is wrong with the log decides.
-        let decides = |finding: &&Finding| finding.code == assessment.reason;
-        let first = found.iter().find(decides);
-        first
-            .into_iter()
-            .for_each(|finding| paragraph(&finding.message, terminal));
+        let decides = |finding: &Finding| finding.code == assessment.reason;
+        if let Some(at) = found.iter().position(decides) {
+            paragraph(&found.remove(at).message, terminal);
+        }
     }
     known
         .iter()

@@ -278,7 +278,8 @@ impl Road<'_> {
 /// A plan for this robot that was written before.
 fn read_plan(path: &Path, robot: &Robot) -> Outcome<Plan> {
     let name = path.to_string_lossy().into_owned();
-    let remedy = "give a plan that `twincal statistics` wrote, or --plan auto";
+    let remedy = "give a plan that this version of `twincal statistics` wrote; of the folder's own one, remove it with its \
+                  statistics or give another folder with -o";
     let bytes = InputFile::new(path, MAX_PLAN)
         .read()
         .map_err(|refusal| refusal.into_error(&name, remedy))?;
@@ -286,7 +287,13 @@ fn read_plan(path: &Path, robot: &Robot) -> Outcome<Plan> {
         let problem = format!("is no plan: {e}");
         Error::content(Place::file(&name), problem, remedy)
     })?;
-    plan.require_for(robot)?;
+    plan.require_for(robot).map_err(|error| {
+        let problem = format!("{name}: {error}");
+        Failure::usage(
+            problem,
+            "give another folder with -o, or remove the plan and its statistics",
+        )
+    })?;
     Ok(plan)
 }
 

@@ -1,4 +1,4 @@
-//! The effects found, the ones that cannot be excluded, the ones that are absent, and the terms that were dropped. An
+//! The effects found, the tentative ones, the ones that are absent, and the terms that were dropped. An
 //! effect is a component: one physical story with all its columns.
 
 use super::remarks::remarks;

@@ -24,7 +24,7 @@ pub fn next_motion(calibration: &Calibration, folder: &str) -> Option<NextMotion
     let unlimited = (0..robot.joint_names().len())
         .any(|joint| robot.joint(joint).limits.velocity.is_none_or(|v| v <= 0.0));
     let limits = match unlimited {
-        true => " --limits limits.toml",
+        true => " --limits FILE",
         false => "",
     };
     (!open.is_empty()).then(|| NextMotion {
@@ -132,7 +132,7 @@ mod tests {
             next_motion(&own, "out").expect("open effects").command
         };
         assert_eq!(with(Some(2.0)), "twincal design --twin out -o motion");
-        let stated = "twincal design --twin out --limits limits.toml -o motion";
+        let stated = "twincal design --twin out --limits FILE -o motion";
         assert_eq!([with(None), with(Some(0.0))], [stated; 2]);
     }
 

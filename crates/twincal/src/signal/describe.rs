@@ -269,7 +269,7 @@ pub(crate) fn less_driven(robot: &Robot, logs: &[(String, Vec<Option<f64>>)]) ->
 }
 
 /// Root mean square of each joint's finite torques; `None` without any.
-pub(crate) fn torque_rms(log: &Log<'_>) -> Result<Vec<Option<f64>>> {
+fn torque_rms(log: &Log<'_>) -> Result<Vec<Option<f64>>> {
     let mut sums: Vec<(f64, usize)> = Vec::new();
     log.until(|recording| {
         sums.resize(recording.joints.len(), (0.0, 0));

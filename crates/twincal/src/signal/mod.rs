@@ -46,8 +46,8 @@ pub use chapters::ChapterMotion;
 pub use choose::Chosen;
 pub(crate) use clock::median_step;
 pub use correct::{Corrections, Lag};
+pub(crate) use describe::less_driven;
 pub use describe::{JointOverview, LogOverview, describe, hardly_driven};
-pub(crate) use describe::{less_driven, torque_rms};
 pub(crate) use few_chapters::FewChapters;
 pub use history::{JointHistory, Warmth};
 pub(crate) use history::{

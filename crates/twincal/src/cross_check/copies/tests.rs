@@ -186,3 +186,27 @@ fn sketches_of_recordings_say_nothing() {
     assert_eq!(sketched(&[rippled(1), rippled(2)]), []);
     assert_eq!(sketched(&[]), []);
 }
+
+/// Mains hum of another phase in each log, one to four times as large as the noise, at half a sample's rate and a fraction: patterns repeat
+/// in every log, and in any two.
+#[test]
+fn sketches_of_recordings_with_hum_say_nothing() {
+    for turns in [0.48, 0.4, 0.24] {
+        for times in [1.0, 2.0, 4.0] {
+            let humming = |take: u64| {
+                let mut own = recording(take, take, 6000);
+                for channels in &mut own.joints {
+                    let all = channels.tau.iter_mut().flatten().enumerate();
+                    let phase = 1.7 * take as f64;
+                    all.for_each(|(row, tau)| {
+                        let angle = std::f64::consts::TAU * turns * row as f64 + phase;
+                        *tau += times * NOISE * angle.sin();
+                    });
+                }
+                own
+            };
+            let said = sketched(&[humming(1), humming(2), humming(3)]);
+            assert_eq!(said, [], "{turns} {times}");
+        }
+    }
+}
