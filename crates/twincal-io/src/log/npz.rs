@@ -112,8 +112,10 @@ pub(super) fn read(
     for entry in 0..archive.len() {
         let (key, mut file) = open(&mut archive, entry, name)?;
         let header = header(&mut file, name, &key)?;
-        if let Number::Text(_) = header.number {
-            if NAMES.contains(&key.as_str()) && header.shape.len() == 1 {
+        if let Number::Text(_) = header.number
+            && NAMES.contains(&key.as_str())
+        {
+            if header.shape.len() == 1 {
                 names = text(file, &header, name, &key)?;
             }
             continue;
@@ -161,6 +163,11 @@ pub(super) fn read(
         wanted.iter().any(|column| range.contains(column))
     };
     let used: Vec<&Array> = arrays.iter().filter(uses).collect();
+    let is_text = |array: &&&Array| matches!(array.header.number, Number::Text(_));
+    if let Some(array) = used.iter().find(is_text) {
+        let problem = format!("array `{}` is text, not a number", array.key);
+        return Err(refuse(problem, "save it as numbers, or under another name"));
+    }
     let rows = used.first().map_or(0, |array| array.header.shape[0]);
     if let Some(other) = used.iter().find(|array| array.header.shape[0] != rows) {
         return Err(refuse(
