@@ -212,7 +212,7 @@ fn what_does_not_belong_together_is_refused() {
     assert!(with(&|_| ()).is_ok());
     refused(
         with(&|other| other.plan.version += 1),
-        "version 2 of the plan",
+        "version 3 of the plan",
     );
     refused(
         with(&|other| other.plan.pipeline.cutoff_hz *= 2.0),
