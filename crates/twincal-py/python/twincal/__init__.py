@@ -23,9 +23,12 @@ Units are SI and radians. Errors are those of `twincal.errors`.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
-
+# Nothing is imported here, `typing` included: what stands before the command `twincal` is a time in
+# which Ctrl-C ends it with a traceback.
+TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from typing import Any
+
     from twincal import errors, fleet, plot
     from twincal._calibration import Calibration, Draws, LogTorque, Torque, fit
     from twincal._decoys import decoys
