@@ -158,7 +158,7 @@ fn what_is_done_is_kept() {
     let plan = fs::read_to_string(at.join("st/plan.json")).unwrap();
     fs::write(
         at.join("old.json"),
-        plan.replacen("\"version\": 1", "\"version\": 0", 1),
+        plan.replacen("\"version\": 2", "\"version\": 0", 1),
     )
     .unwrap();
     let line = "statistics run1.csv --model arm.urdf --plan old.json -o three";

@@ -105,7 +105,7 @@ mod tests {
         assert!(of(same(Alike::TheseLogs)).contains(", in these logs only;"));
         assert_eq!(
             of(StatusReason::NoRigidBody { chance: 0.002 }),
-            "physically inconsistent (p-value <\u{202f}0.01)"
+            "physically inconsistent (p-value 0.002)"
         );
         assert_eq!(of(StatusReason::Probability), "");
     }
