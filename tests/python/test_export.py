@@ -401,15 +401,17 @@ def test_mjcf_changes_nothing_but_numbers(planar):
 
 @pytest.mark.skipif(not UR10.is_dir(), reason="../shared/data/ur10 is not there")
 def test_what_a_real_robot_does_not_establish_changes_no_body(tmp_path):
-    """The maker's model has centres of mass at the joints. Slow motion establishes one body beside friction, a wrist's: all other inertias stay."""
+    """The maker's model has centres of mass at the joints. Slow motion establishes a wrist's mass and a payload beside friction: all other
+    inertias stay, and what the payload's tensor leaves open is the nearest body's."""
     fit(tmp_path, [UR10 / "run0.parquet"], "", model=UR10 / "model.urdf", expect=None)
     said = twincal("export", "--twin", tmp_path / "out", "--to", "urdf", "-o", tmp_path / "exported.urdf", "--json")
     told = json.loads(said.stdout)
     assert max(told["lost"]) < 0.1 and max(told["correction"]) > 10
-    assert told["projection"] is None and [link["link"] for link in told["links"]] == ["wrist_1_link"]
+    assert told["projection"]["links"] == ["wrist_3_link"]
+    assert [link["link"] for link in told["links"]] == ["wrist_1_link", "wrist_3_link"]
     before, after = (pin.buildModelFromUrdf(str(path)) for path in (UR10 / "model.urdf", tmp_path / "exported.urdf"))
     changed = [name for name, a, b in zip(before.names, before.inertias, after.inertias) if (a.toDynamicParameters() != b.toDynamicParameters()).any()]
-    assert changed == ["wrist_1_joint"]
+    assert changed == ["wrist_1_joint", "wrist_3_joint"]
     result = json.loads((tmp_path / "out" / "result.json").read_text())
     status = {c["name"]: c["status"] for c in result["components"]}
     assert all(status[w["component"]] in ("established", "equivalent") for w in told["written"])
