@@ -229,6 +229,15 @@ fn other_number_types_are_read() {
     assert_eq!(recording.joints[1].q, [0.5, -1.25, 2.0, 8.0]);
 }
 
+#[test]
+fn a_channel_of_text_is_refused() {
+    let header = "{'descr': '<U1', 'fortran_order': False, 'shape': (1, 2), }";
+    let (t, q) = (doubles("(1,)", &[0.0]), doubles("(1, 2)", &[0.0; 2]));
+    let entries = [("t", t), ("q", q), ("qd", array(header, &[0; 8]))];
+    let read = read_entries(&entries, CompressionMethod::Stored);
+    contains(&refused(read), &["array `qd` is text, not a number"]);
+}
+
 /// Also where other arrays are wide.
 #[test]
 fn an_array_with_a_row_per_joint_is_told_to_be_transposed() {
