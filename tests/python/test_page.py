@@ -63,7 +63,7 @@ def hostile(folder):
 
 
 def many_joints(folder, joints=44):
-    """A right model of many joints about vertical axes, each with a link of its own on the base: nothing is found."""
+    """A right model of many joints about vertical axes, each with one link on the base: nothing is found."""
     link = (
         '<link name="l{0}"><inertial><origin xyz="0.1 0 0"/><mass value="1"/>'
         '<inertia ixx="0.05" ixy="0" ixz="0" iyy="0.05" iyz="0" izz="0.05"/></inertial></link>'

@@ -291,7 +291,7 @@ fn a_file_of_other_settings_or_damaged_is_not_kept() {
     assert_eq!(fs::read(&target).unwrap(), good);
 }
 
-/// A run that is killed while it makes a file leaves whole files and its part; the next one goes on and nothing but files of its own stays.
+/// A run that is killed while it makes a file leaves whole files and its part; the next one goes on, and no other file stays.
 #[test]
 fn a_killed_run_goes_on() {
     let folder = logs();

@@ -1,4 +1,4 @@
-//! Long work on a thread of its own, so that Python hears of its stages and of Ctrl-C while it runs.
+//! Long work on a thread beside Python's, so that Python hears of its stages and of Ctrl-C while it runs.
 
 use crate::errors::Problem;
 use crate::pool;

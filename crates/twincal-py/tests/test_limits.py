@@ -33,7 +33,7 @@ except Exception as error:
     ],
 )
 def test_draws_and_chains_of_a_regression(key, value, says):
-    """In a process of its own: a failed allocation ends it."""
+    """In another process: a failed allocation ends it."""
     pytest.importorskip("sklearn")
     done = python(REGRESSION, key, value)
     assert done.returncode == 0, done.stderr

@@ -408,16 +408,16 @@ fn odd_numbers_in_a_plan_are_refused() {
         ("history", "[]"),
     ];
     assert_eq!(taken, harmless);
-    for key in [
-        "coulomb_velocity",
-        "ripple",
-        "linearised_at",
-        "payload_frame",
-    ] {
-        for value in odd {
-            assert!(!used(["library", key], value), "library.{key} = {value}");
-        }
+    let odd = odd.map(|value| ("coulomb_velocity", value));
+    let unknown = [
+        ("payload_frame", r#""nowhere""#),
+        ("ripple", r#"{"nowhere": 3.0}"#),
+        ("linearised_at", r#"{"nowhere": 3.0}"#),
+    ];
+    for (key, value) in odd.into_iter().chain(unknown) {
+        assert!(!used(["library", key], value), "library.{key} = {value}");
     }
+    assert!(used(["library", "ripple"], r#"{"elbow": 3.0}"#));
     let mut narrow = study.plan();
     narrow.pipeline.cutoff_hz = 1e-9;
     narrow.pipeline.motion_cutoff_hz = 4e-9;

@@ -116,32 +116,40 @@ pub(super) fn run(flags: &Check, terminal: &mut Terminal) -> Outcome<u8> {
     if assessment.reason == Code::TooShortToCheck {
         paragraph(&too_short(&validation, twin), terminal);
     } else {
-        let failed = gates.iter().filter(|gate| !gate.passed);
-        failed.for_each(|gate| paragraph(&gate.words, terminal));
-        // The gates hold: what is wrong with the log decides.
-        let decides = |finding: &Finding| finding.code == assessment.reason;
-        if let Some(at) = found.iter().position(decides) {
-            paragraph(&found.remove(at).message, terminal);
-        }
+        decisive(&gates, assessment.reason, &mut found, terminal);
     }
     known
         .iter()
         .for_each(|finding| paragraph(&finding.message, terminal));
+    scores(gates, &validation, terminal);
+    terminal.say("");
+    findings(&found, Notes::In("the output of --json"), terminal);
+    Ok(code)
+}
+
+/// What the verdict rests on: gates that fail, or, where they hold, what is wrong with the log; that is no longer among the findings then.
+fn decisive(gates: &[Gate], reason: Code, found: &mut Vec<Finding>, terminal: &mut Terminal) {
+    let failed = gates.iter().filter(|gate| !gate.passed);
+    failed.for_each(|gate| paragraph(&gate.words, terminal));
+    if let Some(at) = found.iter().position(|finding| finding.code == reason) {
+        paragraph(&found.remove(at).message, terminal);
+    }
+}
+
+/// Every gate beside its limits, what was tested, and how much of the motion is new.
+fn scores(gates: Vec<Gate>, validation: &Validation, terminal: &mut Terminal) {
     let (of_changes, of_joints): (Vec<Gate>, Vec<Gate>) =
         gates.into_iter().partition(changes::is_change);
-    judged(&of_joints, &validation, terminal);
+    judged(&of_joints, validation, terminal);
     let tested = format!(
         "Changes tested: {} (friction of each joint, payload, joint zeros). An unchanged robot fails with probability {} % at most.",
         of_changes.len(),
         100.0 * FALSE_ALARM
     );
     paragraph(&tested, terminal);
-    if let Some(text) = beyond(&validation) {
+    if let Some(text) = beyond(validation) {
         paragraph(&text, terminal);
     }
-    terminal.say("");
-    findings(&found, Notes::In("the output of --json"), terminal);
-    Ok(code)
 }
 
 /// The answer as a gate says it.

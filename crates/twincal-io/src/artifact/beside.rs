@@ -30,7 +30,7 @@ impl Beside {
             return Err(Error::content(
                 Place::file(shown),
                 "cannot be replaced as a whole",
-                "give the name of a folder or file of its own, such as `twincal-out`",
+                "give the name of a new folder or file, such as `twincal-out`",
             ));
         };
         let parent = match target.parent() {

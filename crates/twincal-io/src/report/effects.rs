@@ -402,7 +402,7 @@ mod tests {
         );
         let html = crate::report::render(&calibration, &crate::report::ReportContext::default());
         assert!(
-            html.unwrap()
+            html.expect("a page")
                 .contains("2 unidentifiable: not seen by these data")
         );
     }
@@ -426,7 +426,7 @@ mod tests {
         let shown = effect(own, &fixture::two_joints());
         assert_eq!(shown.all[0].value, "294 (276 … 424)");
         let html = crate::report::render(&calibration, &crate::report::ReportContext::default());
-        assert!(html.unwrap().contains("one number, 1 not seen"));
+        assert!(html.expect("a page").contains("one number, 1 not seen"));
     }
 
     fn flat(kinds: Vec<Kind>) -> Vec<Effect> {
@@ -560,7 +560,7 @@ mod tests {
         assert_eq!(values, ["0.470 ± 0.080", "–"]);
         assert_eq!(effect.unseen, ["com y", "izz"]);
         let html = crate::report::render(&calibration, &crate::report::ReportContext::default());
-        let html = html.unwrap();
+        let html = html.expect("a page");
         assert!(html.contains("not seen by these data: com y, izz"));
         assert!(!html.contains("0 ± 0<"));
     }

@@ -31,6 +31,7 @@ use crate::error::{Finding, Result};
 use crate::gram::Gram;
 use crate::infer::infer_near;
 use crate::likelihood::{Columns, Spread};
+use crate::plug_in::Fit;
 use crate::posterior::Posterior;
 use crate::robot::Robot;
 use crate::self_check::self_check;
@@ -96,16 +97,8 @@ fn road(
     progress: &Watch<'_>,
     findings: &mut Vec<Finding>,
 ) -> Result<Calibration> {
-    let (robot, plan) = (&statistics.robot, &statistics.plan);
-    plan.require_for(robot)?;
-    require_even_rows(settings)?;
-    // Of a robot among others the fleet has said it.
-    if pooled.is_none() {
-        require_like(statistics)?;
-    }
-    let mut settings = settings.clone();
-    settings.library = plan.library.clone();
-    settings.noise.model = plan.noise;
+    let robot = &statistics.robot;
+    let settings = planned((statistics, pooled), settings)?;
     progress(Stage::Rows)?;
     let known = known((statistics, pooled), &settings, findings)?;
     let Known {
@@ -123,11 +116,7 @@ fn road(
         Some(pooled) => pooled.fitted((robot, sums, columns), &settings, findings)?,
     };
     let fit = &fitted.fit;
-    let inside = compact::members(&fit.problem, &fit.posterior);
-    let compact: Posterior = match pooled {
-        None => compact::refit(&fit.problem, &inside, &fit.posterior)?,
-        Some(pooled) => pooled.compact(&inside, &fit.posterior)?,
-    };
+    let compact = compacted(fit, pooled)?;
     let twin = twin(statistics, &known, &fitted);
     let own = held_out::Own {
         twin: &twin,
@@ -143,13 +132,7 @@ fn road(
     findings.extend(worse::findings(robot, &validation.filtered));
     findings.extend(worse::of_compact(validation.compact));
     progress(Stage::Sensitivity)?;
-    let opinion = SecondOpinion {
-        sandwich: match pooled {
-            None => sandwich::sds(fit, &compact, sums),
-            Some(pooled) => vec![None; pooled.mean.len()],
-        },
-        compact: compact::summary(library, &fit.problem, &fit.posterior, &compact, &fit.gram),
-    };
+    let opinion = opinion((library, pooled), (fit, sums), &compact);
     let (zero, states) = (&known.zero_columns, &facts.states);
     let excitation = unseen::excitation(robot, &known.every_candidate, zero, &fit.gram, states);
     let mut facts = facts.clone();
@@ -169,6 +152,47 @@ fn road(
         pooled: pooled.is_some(),
     };
     stages::told(pieces, &excitation, findings)
+}
+
+/// The settings with what the plan has chosen, where it and the statistics can be used.
+fn planned(
+    (statistics, pooled): (&Statistics, Option<&Pooled>),
+    settings: &CalibrationSettings,
+) -> Result<CalibrationSettings> {
+    let plan = &statistics.plan;
+    plan.require_for(&statistics.robot)?;
+    require_even_rows(settings)?;
+    // A fleet has left out robots with torque of another size.
+    if pooled.is_none() {
+        require_like(statistics)?;
+    }
+    let mut settings = settings.clone();
+    settings.library = plan.library.clone();
+    settings.noise.model = plan.noise;
+    Ok(settings)
+}
+
+/// The posterior of the effects that are in alone.
+fn compacted(fit: &Fit, pooled: Option<&Pooled>) -> Result<Posterior> {
+    let inside = compact::members(&fit.problem, &fit.posterior);
+    match pooled {
+        None => compact::refit(&fit.problem, &inside, &fit.posterior),
+        Some(pooled) => pooled.compact(&inside, &fit.posterior),
+    }
+}
+
+fn opinion(
+    (library, pooled): (&Library, Option<&Pooled>),
+    (fit, sums): (&Fit, &Sums),
+    compact: &Posterior,
+) -> SecondOpinion {
+    SecondOpinion {
+        sandwich: match pooled {
+            None => sandwich::sds(fit, compact, sums),
+            Some(pooled) => vec![None; pooled.mean.len()],
+        },
+        compact: compact::summary(library, &fit.problem, &fit.posterior, compact, &fit.gram),
+    }
 }
 
 /// The fit, with what chains and plug-ins say of it.

@@ -91,16 +91,7 @@ impl Statistics {
         plan.require_for(robot)?;
         let names = robot.joint_names();
         log.any_recording(|recording| recording.require_torque(&names))?;
-        let payload = log.payload();
-        if payload == Payload::Unknown && !plan.payload_where_unknown {
-            return Err(Error::Statistics {
-                problem: format!(
-                    "log `{}` carries something unknown, which no log of the plan did",
-                    log.name()
-                ),
-                remedy: "make a plan from logs of which some carry it and some do not".into(),
-            });
-        }
+        require_planned_payload(log, plan)?;
         let (library, _) = Library::propose(robot, &plan.library)?;
         let mut findings = as_recorded(robot, log)?;
         let read = ready(robot, log, &plan.pipeline)?;
@@ -135,7 +126,7 @@ impl Statistics {
                 raw,
                 noise,
                 about: About {
-                    facts: LogFacts::of(&log, payload),
+                    facts: LogFacts::of(&log, given.payload()),
                     source: source.to_owned(),
                     reading: String::new(),
                     findings,
@@ -247,6 +238,19 @@ pub(super) fn require_read_back(log: &signal::Log<'_>) -> Result<()> {
         Some(failure) => Err(failure),
         None => Ok(()),
     }
+}
+
+fn require_planned_payload(log: &signal::Log<'_>, plan: &Plan) -> Result<()> {
+    if log.payload() != Payload::Unknown || plan.payload_where_unknown {
+        return Ok(());
+    }
+    Err(Error::Statistics {
+        problem: format!(
+            "log `{}` carries something unknown, which no log of the plan did",
+            log.name()
+        ),
+        remedy: "make a plan from logs of which some carry it and some do not".into(),
+    })
 }
 
 /// Factor between measured and nominal torque which is a unit and not a gear: N·mm is 1000, gears go to 300.

@@ -1,4 +1,4 @@
-//! How far a found inertia is from every rigid body, in standard deviations of its own posterior.
+//! How far a found inertia is from every rigid body, in posterior standard deviations.
 
 use super::projection::{Link, Scale, project};
 use crate::linear_algebra::Cholesky;
@@ -29,7 +29,7 @@ pub(crate) struct Found {
 impl Found {
     /// Chance that the parameters of a rigid body are found as far from those of every rigid body, of the body that is nearest to what was
     /// found; `None` where that drowns in rounding. Where the truth lies on more bounds than that body, as a point mass does, the chance is
-    /// too small by a factor of two or three.
+    /// too small.
     ///
     /// ```text
     /// d² = min (π − π̂)ᵀ C⁻¹ (π − π̂) over bodies π, at π°        P(d²(π° + e) ≥ d²),  e ~ N(0, C)
@@ -44,7 +44,7 @@ impl Found {
         }
         let root = Cholesky::new(&self.relative(false), 10).ok()?;
         let (lower, units) = (root.lower(), self.units());
-        let (mut drawn, mut told, mut farther) = (0, 0, 0);
+        let (mut drawn, mut judged, mut farther) = (0, 0, 0);
         while drawn < DRAWS && farther < ENOUGH {
             let normal: [f64; 10] = std::array::from_fn(|_| random.normal());
             let found = std::array::from_fn(|k| {
@@ -55,10 +55,10 @@ impl Found {
             let Some((own, _)) = self.nearest(found, &metric) else {
                 continue;
             };
-            told += 1;
+            judged += 1;
             farther += usize::from(own >= distance);
         }
-        (2 * told >= drawn).then(|| (1 + farther) as f64 / (1 + told) as f64)
+        (2 * judged >= drawn).then(|| (1 + farther) as f64 / (1 + judged) as f64)
     }
 
     /// `WEIGHT` times the inverse of the covariance.

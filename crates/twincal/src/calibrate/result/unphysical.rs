@@ -56,19 +56,12 @@ pub(in crate::calibrate) fn findings(
     drawer: &Drawer<'_>,
     seed: u64,
 ) -> Vec<Unphysical> {
-    let is_found = |column: usize| {
-        let term = &library.terms()[library.columns()[column]];
-        calibration.components[term.component].is_in()
-    };
-    let mut columns: Vec<Vec<(usize, [f64; 10])>> = vec![Vec::new(); robot.bodies().len()];
-    let mut asked = vec![false; columns.len()];
-    for column in 0..library.columns().len() {
-        if let Some(ModelColumn::Inertia { body, weights }) = library.model_column(column) {
-            columns[*body].push((column, *weights));
-            asked[*body] |= is_found(column);
-        }
-    }
-    if !asked.contains(&true) {
+    let component = |column: usize| library.terms()[library.columns()[column]].component;
+    let is_in = |component: usize| calibration.components[component].is_in();
+    let columns = columns_of_bodies(robot, library);
+    let is_asked =
+        |own: &Vec<(usize, [f64; 10])>| own.iter().any(|(column, _)| is_in(component(*column)));
+    if !columns.iter().any(is_asked) {
         return Vec::new();
     }
     let hidden = base_parameters(robot).unidentifiable;
@@ -79,7 +72,7 @@ pub(in crate::calibrate) fn findings(
         let across = ["Ixx", "Iyy"].map(|moment| hidden.contains(&format!("{name}.{moment}")));
         let whole = !across.contains(&true);
         let nominal = robot.parameters_of_body(body);
-        if !asked[body] || !is_physical(&nominal, whole, ROUNDING) {
+        if !is_asked(&columns[body]) || !is_physical(&nominal, whole, ROUNDING) {
             continue;
         }
         let parameters = |row: usize| {
@@ -101,12 +94,10 @@ pub(in crate::calibrate) fn findings(
             let chance = found(&drawn, nominal, hidden).chance(&mut random);
             // Where rounding hides it the draws decide.
             let chance = chance.unwrap_or(share);
-            let of_column = |(column, _): &(usize, [f64; 10])| {
-                library.terms()[library.columns()[*column]].component
-            };
-            let mut components: Vec<usize> = columns[body].iter().map(of_column).collect();
+            let of_columns = columns[body].iter().map(|(column, _)| component(*column));
+            let mut components: Vec<usize> = of_columns.collect();
             components.dedup();
-            components.retain(|component| calibration.components[*component].is_in());
+            components.retain(|component| is_in(*component));
             all.push(Unphysical {
                 finding: finding(name, share, chance),
                 share,
@@ -116,6 +107,17 @@ pub(in crate::calibrate) fn findings(
         }
     }
     all
+}
+
+/// Columns that change the inertia of each body, with what they change.
+fn columns_of_bodies(robot: &Robot, library: &Library) -> Vec<Vec<(usize, [f64; 10])>> {
+    let mut columns = vec![Vec::new(); robot.bodies().len()];
+    for column in 0..library.columns().len() {
+        if let Some(ModelColumn::Inertia { body, weights }) = library.model_column(column) {
+            columns[*body].push((column, *weights));
+        }
+    }
+    columns
 }
 
 /// Says it, and at once where the numbers stand.
