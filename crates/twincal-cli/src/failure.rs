@@ -88,17 +88,9 @@ impl Failure {
 
 /// The part of an error that says how to fix it; it stands at the end of its message.
 fn remedy_of(error: &Error) -> Option<&str> {
-    use twincal::Error as Core;
     match error {
         Error::Content { remedy, .. } | Error::System { remedy, .. } => Some(remedy),
-        Error::Core(
-            Core::Model { remedy, .. }
-            | Core::Log { remedy, .. }
-            | Core::Term { remedy, .. }
-            | Core::Setting { remedy, .. }
-            | Core::Refused { remedy, .. }
-            | Core::NotFinite { remedy, .. },
-        ) => Some(remedy),
+        Error::Core(core) => core.remedy(),
         _ => None,
     }
 }

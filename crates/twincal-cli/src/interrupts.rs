@@ -1,10 +1,57 @@
-//! Ctrl-C: ends the program at once, or, for a command that can end well, tells it to.
+//! Ctrl-C: ends the program at once, or, for a command that can end well, asks it to. A command that another program called is given up by
+//! that program.
 
+use crate::failure::Outcome;
 use signal_hook::SigId;
 use signal_hook::consts::SIGINT;
 use signal_hook::flag;
+use std::cell::RefCell;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
+
+thread_local! {
+    /// True once the program that called the command of this thread gave it up.
+    static GIVEN_UP: RefCell<Option<Arc<AtomicBool>>> = const { RefCell::new(None) };
+}
+
+/// Runs a command on this thread for a program that may give it up.
+pub(crate) fn unless<T>(given_up: &Arc<AtomicBool>, command: impl FnOnce() -> T) -> T {
+    let before = GIVEN_UP.replace(Some(Arc::clone(given_up)));
+    let result = command();
+    GIVEN_UP.set(before);
+    result
+}
+
+/// The program that called the command of a thread, if one did.
+pub(crate) struct Caller {
+    given_up: Option<Arc<AtomicBool>>,
+}
+
+impl Caller {
+    pub(crate) fn of_this_thread() -> Self {
+        let given_up = GIVEN_UP.with_borrow(Clone::clone);
+        Self { given_up }
+    }
+
+    /// The next step is worth its while.
+    ///
+    /// # Errors
+    /// [`twincal::Error::Cancelled`] once the caller gave the command up.
+    pub(crate) fn require_waiting(&self) -> twincal::Result<()> {
+        match &self.given_up {
+            Some(given_up) if given_up.load(Ordering::SeqCst) => Err(twincal::Error::Cancelled),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// [`Caller::require_waiting`] of this thread's command.
+///
+/// # Errors
+/// [`twincal::Error::Cancelled`] once the caller gave it up.
+pub(crate) fn require_caller() -> Outcome<()> {
+    Ok(Caller::of_this_thread().require_waiting()?)
+}
 
 /// True while Ctrl-C ends the program.
 static ENDS: OnceLock<Arc<AtomicBool>> = OnceLock::new();
@@ -24,7 +71,7 @@ pub(crate) struct Caught {
 
 impl Caught {
     pub(crate) fn new() -> Self {
-        let asked = Arc::new(AtomicBool::new(false));
+        let asked = Caller::of_this_thread().given_up.unwrap_or_default();
         let mut handlers = Vec::new();
         if let Some(ends) = ENDS.get() {
             ends.store(false, Ordering::SeqCst);

@@ -44,7 +44,7 @@ fn code(failure: &Failure) -> &'static str {
         Failure::Error(Error::System { .. }) => "system",
         Failure::Error(Error::Core(core)) => match core {
             Core::Model { .. } => "model",
-            Core::Log { .. } => "log",
+            Core::Log { .. } | Core::Unit { .. } => "log",
             Core::Term { .. } => "term",
             Core::Setting { .. } => "setting",
             Core::Refused { .. } => "refused",

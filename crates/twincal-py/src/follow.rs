@@ -57,8 +57,17 @@ impl Following<'_, '_> {
         py: Python<'_>,
         work: impl FnOnce(Watch<'_>) -> Result<T, Problem> + Send + 'static,
     ) -> PyResult<T> {
-        let stop = Arc::new(AtomicBool::new(false));
-        let messages = start(self.threads, &stop, work).map_err(|problem| problem.raise(py))?;
+        self.until(py, &Arc::new(AtomicBool::new(false)), work)
+    }
+
+    /// [`Self::run`] of work that looks at `stop` as well, which is true once nobody waits for the result.
+    pub(crate) fn until<T: Send + 'static>(
+        &self,
+        py: Python<'_>,
+        stop: &Arc<AtomicBool>,
+        work: impl FnOnce(Watch<'_>) -> Result<T, Problem> + Send + 'static,
+    ) -> PyResult<T> {
+        let messages = start(self.threads, stop, work).map_err(|problem| problem.raise(py))?;
         let outcome = follow(py, &messages, self.progress);
         if outcome.is_err() {
             stop.store(true, Ordering::Relaxed);

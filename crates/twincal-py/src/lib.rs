@@ -14,7 +14,10 @@ mod statistics;
 mod table_columns;
 mod tables;
 
+use follow::Following;
 use pyo3::prelude::*;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 /// The extension module.
 #[pymodule]
@@ -47,8 +50,12 @@ fn command(py: Python<'_>, arguments: Vec<std::ffi::OsString>) -> u8 {
     py.detach(|| twincal_cli::run(arguments))
 }
 
-/// A command of the program without its name: exit code and what it prints on standard output.
+/// A command of the program without its name: exit code and what it prints on standard output. After Ctrl-C it writes no result.
 #[pyfunction]
 fn call(py: Python<'_>, arguments: Vec<std::ffi::OsString>) -> PyResult<(u8, String)> {
-    pool::detached(py, None, || twincal_cli::session::call(arguments))
+    let given_up = Arc::new(AtomicBool::new(false));
+    let own = Arc::clone(&given_up);
+    Following::SILENTLY.until(py, &given_up, move |_| {
+        Ok(twincal_cli::session::call(arguments, &own)?)
+    })
 }

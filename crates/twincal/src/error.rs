@@ -35,6 +35,18 @@ pub enum Error {
         /// How to fix it.
         remedy: String,
     },
+    /// The numbers of a log are in another unit than they should be.
+    #[error("log `{log}`: {problem}; {remedy}")]
+    Unit {
+        /// Name of the log as given by the user.
+        log: String,
+        /// The unit that they are in.
+        unit: WrongUnit,
+        /// What shows it, with the joint and the number.
+        problem: String,
+        /// How to fix it.
+        remedy: String,
+    },
     /// A term of the library cannot be built.
     #[error("term `{term}`, column {column}: {problem}; {remedy}")]
     Term {
@@ -86,6 +98,60 @@ pub enum Error {
     /// Whoever watches the progress asked for an end.
     #[error("cancelled: the calibration was asked to stop; run it again for a result")]
     Cancelled,
+}
+
+/// A unit in which a log cannot be used.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum WrongUnit {
+    /// Position, velocity or both of this joint are in degrees.
+    Degrees(String),
+    /// Stamps are in milliseconds.
+    Milliseconds,
+    /// Stamps are in microseconds.
+    Microseconds,
+    /// Stamps are in nanoseconds.
+    Nanoseconds,
+}
+
+impl Error {
+    /// How to fix it: the end of its message.
+    #[must_use]
+    pub fn remedy(&self) -> Option<&str> {
+        match self {
+            Self::Model { remedy, .. }
+            | Self::Log { remedy, .. }
+            | Self::Unit { remedy, .. }
+            | Self::Term { remedy, .. }
+            | Self::Setting { remedy, .. }
+            | Self::Refused { remedy, .. }
+            | Self::NotFinite { remedy, .. }
+            | Self::Statistics { remedy, .. } => Some(remedy),
+            Self::Cancelled => None,
+        }
+    }
+
+    /// Its message without the name of the log: of errors about one.
+    pub(crate) fn without_log(&self) -> String {
+        match self {
+            Self::Log {
+                problem, remedy, ..
+            }
+            | Self::Unit {
+                problem, remedy, ..
+            } => format!("{problem}; {remedy}"),
+            other => other.to_string(),
+        }
+    }
+
+    /// Its log with another name; itself where it is not about one.
+    #[must_use]
+    pub fn with_log_name(mut self, rename: impl FnOnce(&str) -> String) -> Self {
+        if let Self::Log { log, .. } | Self::Unit { log, .. } = &mut self {
+            *log = rename(log);
+        }
+        self
+    }
 }
 
 /// How much a [`Finding`] matters.

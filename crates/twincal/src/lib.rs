@@ -46,4 +46,4 @@ pub mod write_back;
 pub mod builder;
 pub mod prelude;
 
-pub use error::{Code, Error, Finding, Mistake, Result, Severity};
+pub use error::{Code, Error, Finding, Mistake, Result, Severity, WrongUnit};

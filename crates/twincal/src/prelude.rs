@@ -19,7 +19,7 @@
 //! #     let links = vec![link("base", None), link("cart", Some(inertia))];
 //! #     let (name, gravity) = ("slider".into(), [0.0, 0.0, -9.81]);
 //! #     let description = RobotDescription { name, gravity, links, joints: vec![joint], allow_unphysical: false };
-//! #     Ok(Robot::new(description, &Default::default())?.0)
+//! #     Robot::from_description(description)
 //! # }
 //! # fn record(name: &str, phase: f64) -> Result<Recording, Error> {
 //! let time: Vec<f64> = (0..4000).map(|i| 0.005 * f64::from(i)).collect();
@@ -27,7 +27,7 @@
 //! let q: Vec<f64> = time.iter().map(at).map(|(a, b)| 0.4 * a.sin() + 0.1 * b.sin()).collect();
 //! let qdd: Vec<f64> = time.iter().map(at).map(|(a, b)| -0.676 * a.sin() - 0.961 * b.sin()).collect();
 //! let force: Vec<f64> = qdd.iter().enumerate().map(|(i, a)| 2.5 * a + 0.01 * (1.7 * i as f64).sin()).collect();
-//! let log = Recording::new(name, time).joint(q, force)?.acceleration(qdd)?;
+//! let log = Recording::new(name, time).joint(q, force).acceleration(qdd)?;
 //! # Ok(log) }
 //! # let (log, other) = (record("run1", 0.0)?, record("run2", 1.0)?);
 //! let robot = slider()?; // or twincal_io::read_robot("arm.urdf")?
@@ -56,7 +56,7 @@
 //! let term = fit.effects().find(|effect| effect.name() == "sin(q1 - q2)").ok_or("none")?;
 //! assert!(term.status() == Status::Established && (term.parameters()[0].mean - 0.8).abs() < 0.02);
 //!
-//! let torque = fit.twin.torque(&[0.1, 0.7], &[0.5, -0.4], &[1.0, 0.0])?; // one state of two joints
+//! let torque = fit.twin().torque(&[0.1, 0.7], &[0.5, -0.4], &[1.0, 0.0])?; // one state of two joints
 //! for joint in 0..2 {
 //!     println!("{:.2} … {:.2} N·m", torque.low[joint], torque.high[joint]);
 //! }
@@ -69,6 +69,7 @@ pub use crate::calibrate::CalibrationSettings as Settings;
 pub use crate::calibrate::{Calibration, Effect, ParameterSummary, Stage, Status, Stopped};
 pub use crate::error::{Error, Finding, Severity};
 pub use crate::robot::Robot;
+pub use crate::signal::NextChannel as _;
 pub use crate::signal::{Auto, Log, Payload, Recording};
 pub use crate::term::Family;
 pub use crate::twin::{Torque, TorqueModel, Twin};

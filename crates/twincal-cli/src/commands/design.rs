@@ -7,7 +7,7 @@ use super::summary::paragraph;
 use super::table::{print_table, table};
 use crate::args::{Criterion as OfFlags, Design as Flags};
 use crate::failure::{Failure, Outcome};
-use crate::interrupts::Caught;
+use crate::interrupts::{Caught, require_caller};
 use crate::names::display_names;
 use crate::progress::Progress;
 use crate::terminal::Terminal;
@@ -241,6 +241,7 @@ pub(super) fn run(flags: &Flags, terminal: &mut Terminal) -> Outcome<u8> {
     };
     let json = design_json(&found, &about)?;
     let files = files(&found, &about, json.clone())?;
+    require_caller()?;
     claim.commit(Maker::Design, files)?;
     terminal.complete(&flags.output);
     if flags.json {

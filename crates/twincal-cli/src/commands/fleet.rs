@@ -6,6 +6,7 @@ use super::start_threads;
 use super::summary::{indented, paragraph};
 use crate::args::Fleet as Flags;
 use crate::failure::{Failure, Outcome};
+use crate::interrupts::{Caller, require_caller};
 use crate::names::display_names;
 use crate::progress::Progress;
 use crate::terminal::Terminal;
@@ -40,11 +41,12 @@ pub(super) fn run(flags: &Flags, terminal: &mut Terminal) -> Outcome<u8> {
     let asked = Fleet::with_twins(twins.robots());
     let (fleet, models) = read(asked, &flags.files, &progress)?;
     let progress = Mutex::new(progress);
+    let caller = Caller::of_this_thread();
     let watch = |stage: FleetStage| {
         if let Ok(progress) = progress.lock() {
             show(stage, &progress);
         }
-        Ok(())
+        caller.require_waiting()
     };
     let result = fleet
         .fit(&settings, &watch)
@@ -70,6 +72,7 @@ pub(super) fn run(flags: &Flags, terminal: &mut Terminal) -> Outcome<u8> {
     let page = fleet_page(&result, &about)?;
     let mut files = vec![(FLEET, json.clone()), (PAGE, page.into_bytes())];
     files.extend(file);
+    require_caller()?;
     twins.write(&result, model, terminal)?;
     claim.commit(Maker::Fleet, files)?;
     terminal.complete(&flags.output);

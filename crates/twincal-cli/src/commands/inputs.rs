@@ -2,6 +2,7 @@
 
 use super::as_fitted::AsFitted;
 use crate::failure::Outcome;
+use crate::interrupts::require_caller;
 use crate::names::display_names;
 use crate::progress::Progress;
 use std::path::{Path, PathBuf};
@@ -220,6 +221,7 @@ impl LogInput {
         let mut input = Self::new(paths.to_vec());
         let said = paths.len().div_ceil(MOST_SAID).max(1);
         for (number, (path, name)) in paths.iter().zip(names).enumerate() {
+            require_caller()?;
             if number % said == 0 {
                 let of = match said {
                     1 => String::new(),
@@ -313,22 +315,12 @@ impl LogInput {
 
     /// The error with the log named as it was given instead of as it stands in results.
     pub(super) fn as_given(&self, error: twincal::Error) -> twincal::Error {
-        match error {
-            twincal::Error::Log {
-                log,
-                problem,
-                remedy,
-            } => {
-                let at = self.files.iter().position(|file| file.name == log);
-                let log = at.map_or(log, |at| self.given[at].to_string_lossy().into_owned());
-                twincal::Error::Log {
-                    log,
-                    problem,
-                    remedy,
-                }
-            }
-            other => other,
-        }
+        error.with_log_name(|log| {
+            let at = self.files.iter().position(|file| file.name == log);
+            at.map_or(log.to_owned(), |at| {
+                self.given[at].to_string_lossy().into_owned()
+            })
+        })
     }
 }
 

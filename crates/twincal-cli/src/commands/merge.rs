@@ -3,6 +3,7 @@
 use super::{count_of_logs, print_json};
 use crate::args::Merge;
 use crate::failure::{Failure, Outcome};
+use crate::interrupts::require_caller;
 use crate::names::display_names;
 use crate::progress::Progress;
 use crate::terminal::Terminal;
@@ -86,5 +87,6 @@ pub(super) fn write(
         Some(to) => content(BufWriter::new(to))?,
         None => Ok(()),
     };
+    require_caller()?;
     Ok(output.commit(written)?)
 }

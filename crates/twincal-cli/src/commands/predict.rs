@@ -7,6 +7,7 @@ use super::{print_json, reads, require_strict, settings, start_threads};
 use crate::args::Predict;
 use crate::exit;
 use crate::failure::{Failure, Outcome};
+use crate::interrupts::require_caller;
 use crate::progress::Progress;
 use crate::terminal::Terminal;
 use serde::Serialize;
@@ -74,6 +75,7 @@ pub(super) fn run(flags: &Predict, terminal: &mut Terminal) -> Outcome<u8> {
                 None => Ok(()),
             };
             require_strict(settings.log.strict, &prediction.findings)?;
+            require_caller()?;
             output.commit(written)?;
             terminal.complete(place);
         }

@@ -8,6 +8,7 @@ use super::{fit, merge, run};
 use crate::args::Arguments;
 use crate::clock::Stopwatch;
 use crate::failure::{Failure, Outcome};
+use crate::interrupts;
 use crate::names::display_names;
 use crate::progress::{Progress, silently};
 use crate::terminal::Terminal;
@@ -15,6 +16,7 @@ use clap::Parser as _;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use twincal::Finding;
 use twincal::calibrate::{Plan, Stage, Statistics, plan};
 use twincal::robot::Robot;
@@ -366,16 +368,22 @@ pub fn merged(sum: &StatisticsFile, other: &StatisticsFile) -> Outcome<Statistic
 }
 
 /// Runs a command of the program with these arguments, without its name, and returns exit code and what it would have
-/// printed on standard output. It uses the threads of the pool that it is called in.
+/// printed on standard output. It uses the threads of the pool that it is called in. Once `given_up` is true the command ends at
+/// its next log or stage and writes nothing.
 ///
 /// # Errors
-/// Why the command could not do what it was asked.
-pub fn call(arguments: impl IntoIterator<Item = OsString>) -> Outcome<(u8, String)> {
+/// Why the command could not do what it was asked; [`twincal::Error::Cancelled`] of one that was given up.
+pub fn call(
+    arguments: impl IntoIterator<Item = OsString>,
+    given_up: &Arc<AtomicBool>,
+) -> Outcome<(u8, String)> {
     let name = std::iter::once(OsString::from("twincal"));
     let arguments = Arguments::try_parse_from(name.chain(arguments)).map_err(|error| {
         Failure::usage(error.to_string(), "see `twincal help` for the arguments")
     })?;
     let mut terminal = Terminal::kept();
-    let code = silently(|| run(&arguments.command, &mut terminal))?;
+    let code = interrupts::unless(given_up, || {
+        silently(|| run(&arguments.command, &mut terminal))
+    })?;
     Ok((code, terminal.into_kept()))
 }

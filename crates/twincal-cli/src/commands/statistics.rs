@@ -61,6 +61,8 @@ struct Road<'a> {
     robot_name: String,
     progress: Progress,
     findings: Vec<Finding>,
+    /// The only log, if the plan was made of it: it is not read again.
+    read: Option<LogInput>,
 }
 
 pub(super) fn run(flags: &StatisticsFlags, terminal: &mut Terminal) -> Outcome<u8> {
@@ -95,6 +97,7 @@ pub(super) fn run(flags: &StatisticsFlags, terminal: &mut Terminal) -> Outcome<u
         findings: robot.findings.clone(),
         robot,
         progress,
+        read: None,
     };
     road.require_folder()?;
     let plan = road.plan()?;
@@ -191,11 +194,15 @@ impl Road<'_> {
             ..self.settings.calibration.clone()
         };
         let step = |stage| show(stage, "", &self.progress);
-        let logs = std::mem::take(&mut read.logs);
-        let made = plan_about(about, robot, logs, &settings, &step);
+        let only = self.flags.logs.len() == 1;
+        let made = match only {
+            true => plan_about(about, robot, &read.logs[..], &settings, &step),
+            false => plan_about(about, robot, std::mem::take(&mut read.logs), &settings, &step),
+        };
         let (plan, findings) =
             made.map_err(|stopped| Failure::from(read.as_given(stopped.error)))?;
         self.findings.extend(findings);
+        self.read = only.then_some(read);
         Ok(plan)
     }
 
@@ -227,7 +234,10 @@ impl Road<'_> {
         }
         let long = Long::of_pipeline(&plan.pipeline);
         let (robot, settings) = (&self.robot.robot, &self.settings.log);
-        let read = LogInput::read_one((path, name), robot, settings, long, &self.progress)?;
+        let read = match self.read.take() {
+            Some(read) => read,
+            None => LogInput::read_one((path, name), robot, settings, long, &self.progress)?,
+        };
         self.findings.extend(read.findings.iter().cloned());
         require_strict(settings.strict, &read.findings)?;
         let output = OutputFile::create(&target, self.flags.force, self.inputs)?;

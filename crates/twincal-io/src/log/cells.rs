@@ -8,9 +8,9 @@ use std::io;
 use std::ops::Range;
 
 /// Bytes of numbers from which a log is long; tests of this crate have less patience.
-const LONG: usize = if cfg!(test) { 1 << 20 } else { 128 << 20 };
+const LONG: usize = if cfg!(test) { 1 << 20 } else { 102 << 20 };
 /// Bytes of a chapter, and its rows at least: filters take some seconds at either end.
-const CHAPTER: usize = LONG / 8;
+const CHAPTER: usize = if cfg!(test) { 1 << 17 } else { 16 << 20 };
 const FEWEST_ROWS: usize = if cfg!(test) { 1 << 10 } else { 1 << 17 };
 const BYTES: usize = size_of::<f64>();
 

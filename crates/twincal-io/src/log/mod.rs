@@ -116,7 +116,7 @@ pub fn read_log(
     in_memory(read(path, robot, options, false)?)
 }
 
-/// The same, but a log that is long (128 MiB of numbers) is left in a temporary file and comes in chapters: memory does not grow with
+/// The same, but a log that is long (102 MiB of numbers) is left in a temporary file and comes in chapters: memory does not grow with
 /// it.
 ///
 /// # Errors

@@ -1,10 +1,9 @@
 //! The effects found, the tentative ones, the ones that are absent, and the terms that were dropped. An
-//! effect is a component: one physical story with all its columns.
+//! effect is a component: one physical effect with all its columns.
 
-use super::remarks::remarks;
 use crate::words::number::plus_minus;
 use crate::words::number::{interval, probability, with_ends};
-use crate::words::{family_name, reason as status_reason};
+use crate::words::{family_name, reason as status_reason, remarks};
 use serde::Serialize;
 use twincal::calibrate::{
     Calibration, ComponentSummary, ParameterSummary, Status as Said, TermSummary,

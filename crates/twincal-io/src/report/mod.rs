@@ -19,7 +19,6 @@ mod honesty;
 pub(crate) mod fixture;
 mod page;
 mod plot;
-mod remarks;
 mod scale;
 mod script;
 mod standstill;

@@ -5,9 +5,10 @@ use arrow_array::cast::AsArray as _;
 use arrow_array::{ArrayRef, RecordBatch, StringArray};
 use arrow_ipc::reader::FileReader;
 use arrow_ipc::writer::FileWriter;
+use proptest::prelude::*;
 use std::collections::HashMap;
 use std::fs;
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 use twincal::calibrate::{CalibrationSettings, plan};
 use twincal::random::Random;
 use twincal::robot::{
@@ -168,6 +169,47 @@ fn merged_files_are_what_merged_statistics_are() {
     fs::write(at("b"), bytes(&of_log("b", 7))).unwrap();
     let error = files.write_to(Vec::new()).unwrap_err().to_string();
     assert!(error.contains("/b: is damaged"), "{error}");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig {
+        cases: 100,
+        rng_seed: proptest::test_runner::RngSeed::Fixed(1),
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    })]
+
+    /// Whichever two of seven sets are added next, as values or as files: the same bytes.
+    #[test]
+    fn any_tree_of_merges_has_the_same_bytes(
+        pairs in proptest::collection::vec(any::<[prop::sample::Index; 2]>(), 6),
+        by_file in any::<[bool; 6]>(),
+    ) {
+        static LOGS: LazyLock<(Vec<StatisticsFile>, Vec<u8>)> = LazyLock::new(|| {
+            let logs: Vec<_> = (0..7).map(|log| of_log(&format!("log{log}"), log)).collect();
+            let mut whole = logs[0].clone();
+            for log in &logs[1..] {
+                whole.statistics.try_merge(&log.statistics).unwrap();
+            }
+            (logs, bytes(&whole))
+        });
+        let folder = tempfile::tempdir().unwrap();
+        let (mut left, whole) = (LOGS.0.clone(), &LOGS.1);
+        for ([one, other], by_file) in pairs.iter().zip(by_file) {
+            let mut one = left.swap_remove(one.index(left.len()));
+            let other = left.swap_remove(other.index(left.len()));
+            if by_file {
+                let paths = ["one", "other"].map(|name| folder.path().join(name));
+                fs::write(&paths[0], bytes(&one)).unwrap();
+                fs::write(&paths[1], bytes(&other)).unwrap();
+                one = StatisticsFiles::open(&paths, &mut |_| {}).unwrap().read().unwrap();
+            } else {
+                one.statistics.try_merge(&other.statistics).unwrap();
+            }
+            left.push(one);
+        }
+        prop_assert!(bytes(&left[0]) == *whole, "{pairs:?} {by_file:?}");
+    }
 }
 
 /// Names interleave, so that every row is in another file than the one before; more files than are open at a time.

@@ -17,6 +17,8 @@ pub(crate) mod list;
 mod motion;
 mod next;
 pub(crate) mod number;
+#[cfg(feature = "report")]
+mod remark;
 mod remedy;
 mod rest;
 mod shape;
@@ -34,6 +36,8 @@ pub(crate) use intervals::guarantee;
 pub(crate) use motion::PAGE_FOLDER;
 pub use motion::{NextMotion, next_motion};
 pub use number::{percent, probability};
+#[cfg(feature = "report")]
+pub(crate) use remark::remarks;
 pub use remedy::{Remedy, When, remedy};
 pub use status::reason;
 pub(crate) use status::with;

@@ -27,6 +27,7 @@ mod answer;
 mod beyond;
 mod claim;
 mod decide;
+mod explanation;
 mod intervals;
 mod next;
 mod of_torque;
@@ -37,6 +38,7 @@ mod shape;
 pub use answer::{Answer, decision_table};
 pub use claim::{Claim, Evidence, Role, Subject};
 pub use decide::decide;
+pub use explanation::{Explanation, TensorElement, explanations};
 pub use next::{Request, RequestCode, open_effects};
 pub use rest::{AtRest, Pauses, all_at_rest, at_rest, few_pauses, standstill};
 pub use scores::{

@@ -93,6 +93,8 @@ impl Statistics {
         log.any_recording(|recording| recording.require_torque(&names))?;
         require_planned_payload(log, plan)?;
         let (library, _) = Library::propose(robot, &plan.library)?;
+        // While nothing else of the log is in memory.
+        let noise = Sketch::of(log, robot.dof())?;
         let mut findings = as_recorded(robot, log)?;
         let read = ready(robot, log, &plan.pipeline)?;
         let reader = Reader {
@@ -103,6 +105,7 @@ impl Statistics {
         };
         let given = log;
         let (log, trajectory) = reader.log(&read, Role::Fit(&[]), &mut findings)?;
+        drop(read);
         let motion = std::iter::once(&trajectory);
         let compared = look(robot, &plan.pipeline, motion)?;
         require_unit(given.name(), &compared)?;
@@ -113,7 +116,6 @@ impl Statistics {
                 remedy: "leave the log out".into(),
             });
         }
-        let noise = Sketch::of(given, robot.dof())?;
         let raw = raw((robot, &library), plan, &log, &trajectory)?;
         let sums = LogSums::of(&log.observations.whole(), BLOCKS).with_runs(plan.runs());
         require_read_back(given)?;

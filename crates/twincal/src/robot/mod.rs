@@ -104,6 +104,33 @@ impl TryFrom<Parts> for Robot {
 }
 
 impl Robot {
+    /// [`Robot::new`] of a robot whose joints are all free, without what was found on the way.
+    ///
+    /// # Errors
+    /// Those of [`Robot::new`].
+    ///
+    /// # Example
+    /// ```
+    /// use twincal::robot::*;
+    ///
+    /// let inertia = Inertia { mass: 2.0, com: [0.0; 3], tensor: [[0.0; 3]; 3] };
+    /// let link = |name: &str, inertia| LinkDescription { name: name.into(), inertia };
+    /// let mut joint = JointDescription::new("axis", JointKind::Prismatic, "base", "cart");
+    /// joint.axis = [1.0, 0.0, 0.0];
+    /// let robot = Robot::from_description(RobotDescription {
+    ///     name: "slider".into(),
+    ///     gravity: [0.0, 0.0, -9.81],
+    ///     links: vec![link("base", None), link("cart", Some(inertia))],
+    ///     joints: vec![joint],
+    ///     allow_unphysical: false,
+    /// })?;
+    /// assert_eq!(robot.joint_names(), ["axis"]);
+    /// # Ok::<(), twincal::Error>(())
+    /// ```
+    pub fn from_description(description: RobotDescription) -> Result<Self> {
+        Self::new(description, &BTreeMap::new()).map(|(robot, _)| robot)
+    }
+
     /// Checks a description and lays it out. `locked` fixes moving joints at a position (rad or m).
     ///
     /// Findings: `axis_normalised`, `point_mass`, `unphysical_inertia`, `locked_fixed_joint`, `locked_beyond_limits`,

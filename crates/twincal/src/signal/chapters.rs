@@ -106,13 +106,9 @@ impl LongLog {
             }
             match visited {
                 Ok(()) => said.extend(of_chapter.into_iter().map(|finding| (number, finding))),
-                Err(Error::Log {
-                    log,
-                    problem,
-                    remedy,
-                }) => {
+                Err(unusable @ (Error::Log { .. } | Error::Unit { .. })) => {
                     rows += self.samples[number] as u64;
-                    unused.push((number, log, problem, remedy));
+                    unused.push((number, unusable));
                 }
                 Err(other) => return Err(other),
             }
@@ -126,13 +122,9 @@ impl LongLog {
         findings.extend(self.folding.findings(&self.name));
         findings.extend(told_once(said, chapters));
         let count = unused.len();
-        if let Some((chapter, log, problem, remedy)) = unused.into_iter().next() {
+        if let Some((chapter, first)) = unused.into_iter().next() {
             if count == chapters {
-                return Err(Error::Log {
-                    log,
-                    problem,
-                    remedy,
-                });
+                return Err(first);
             }
             let all: usize = self.samples.iter().sum();
             let severity = if rows as f64 > LEFT_OUT_LIMIT * all as f64 {
@@ -145,8 +137,9 @@ impl LongLog {
                 Code::ChaptersLeftOut,
                 &self.name,
                 format!(
-                    "{count} of {chapters} chapters cannot be used and were left out; the first is number {}: {problem}; {remedy}",
-                    chapter + 1
+                    "{count} of {chapters} chapters cannot be used and were left out; the first is number {}: {}",
+                    chapter + 1,
+                    first.without_log()
                 ),
                 rows,
             ));

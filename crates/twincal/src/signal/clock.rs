@@ -2,7 +2,7 @@
 
 use super::Recording;
 use super::repeats::{Sampled, sampled};
-use crate::error::{Code, Error, Finding, Result, Severity};
+use crate::error::{Code, Error, Finding, Result, Severity, WrongUnit};
 use rayon::prelude::*;
 
 /// A step longer than this many median intervals is a gap: the log is cut there.
@@ -273,14 +273,14 @@ fn median_interval(
         return Ok(interval);
     }
     let guess = [
-        ("milliseconds", "ms", 1e-3),
-        ("microseconds", "us", 1e-6),
-        ("nanoseconds", "ns", 1e-9),
+        (WrongUnit::Milliseconds, "milliseconds", "ms", 1e-3),
+        (WrongUnit::Microseconds, "microseconds", "us", 1e-6),
+        (WrongUnit::Nanoseconds, "nanoseconds", "ns", 1e-9),
     ]
     .into_iter()
-    .find(|(_, _, unit)| (10.0..=1e5).contains(&(1.0 / (interval * unit))));
-    let (problem, remedy) = match guess {
-        Some((unit, short, size)) => (
+    .find(|(.., size)| (10.0..=1e5).contains(&(1.0 / (interval * size))));
+    let (problem, remedy) = match &guess {
+        Some((_, unit, short, size)) => (
             format!(
                 "the median time step is {interval} s; the stamps look like {unit} ({} Hz)",
                 (1e3 / (interval * size)).round() / 1e3
@@ -307,7 +307,15 @@ fn median_interval(
         ));
         return Ok(interval);
     }
-    Err(log_error(log, problem, remedy))
+    Err(match guess {
+        Some((unit, ..)) => Error::Unit {
+            log: log.name.clone(),
+            unit,
+            problem,
+            remedy,
+        },
+        None => log_error(log, problem, remedy),
+    })
 }
 
 /// Cuts the kept rows into runs.

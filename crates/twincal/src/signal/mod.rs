@@ -55,6 +55,7 @@ pub(crate) use history::{
 };
 pub use long::{Log, Logs, LongLog, ReadChapter};
 pub use ready::{LongReady, ReadyLog};
+pub use recording::NextChannel;
 pub use shelf::{Numbers, Shelf};
 pub use steps::{Steps, steps};
 pub(crate) use stretches::stretches;

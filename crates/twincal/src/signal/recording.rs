@@ -128,6 +128,52 @@ impl Recording {
     }
 }
 
+/// The next channel of a recording whose channels so far are right: the first one that is not is the error.
+///
+/// # Example
+/// ```
+/// use twincal::prelude::*;
+///
+/// let log = || Recording::new("run1", [0.0, 0.1, 0.2]);
+/// let two = log().joint([1.0; 3], [0.0; 3]).velocity([0.0; 3]).joint([2.0; 3], [0.5; 3])?;
+/// assert_eq!(two.joints.len(), 2);
+/// assert!(log().joint([1.0; 3], [0.0; 2]).joint([2.0; 3], [0.5; 3]).is_err());
+/// # Ok::<(), twincal::Error>(())
+/// ```
+pub trait NextChannel: Sized {
+    /// [`Recording::joint`].
+    ///
+    /// # Errors
+    /// That of an earlier channel, or of this one.
+    fn joint(self, q: impl Into<Vec<f64>>, torque: impl Into<Vec<f64>>) -> Result<Recording>;
+
+    /// [`Recording::velocity`].
+    ///
+    /// # Errors
+    /// That of an earlier channel, or of this one.
+    fn velocity(self, qd: impl Into<Vec<f64>>) -> Result<Recording>;
+
+    /// [`Recording::acceleration`].
+    ///
+    /// # Errors
+    /// That of an earlier channel, or of this one.
+    fn acceleration(self, qdd: impl Into<Vec<f64>>) -> Result<Recording>;
+}
+
+impl NextChannel for Result<Recording> {
+    fn joint(self, q: impl Into<Vec<f64>>, torque: impl Into<Vec<f64>>) -> Result<Recording> {
+        self?.joint(q, torque)
+    }
+
+    fn velocity(self, qd: impl Into<Vec<f64>>) -> Result<Recording> {
+        self?.velocity(qd)
+    }
+
+    fn acceleration(self, qdd: impl Into<Vec<f64>>) -> Result<Recording> {
+        self?.acceleration(qdd)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

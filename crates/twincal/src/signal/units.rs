@@ -2,7 +2,7 @@
 
 use super::prepare::JointFacts;
 use super::{Channels, Recording};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, WrongUnit};
 use crate::robot::JointKind;
 use rayon::prelude::*;
 
@@ -26,7 +26,7 @@ const SUSTAINED: usize = 5;
 /// in a row reach is no motion.
 ///
 /// # Errors
-/// [`Error::Log`] with the joint, the numbers and the remedy.
+/// [`Error::Unit`] with the joint, the numbers and the remedy.
 pub(crate) fn refuse_degrees(joints: &[JointFacts], log: &Recording) -> Result<()> {
     let check = |(facts, channels)| refuse_joint(facts, channels, log);
     let checked: Vec<Result<()>> = joints.par_iter().zip(&log.joints).map(check).collect();
@@ -36,8 +36,9 @@ pub(crate) fn refuse_degrees(joints: &[JointFacts], log: &Recording) -> Result<(
 /// The same for one joint.
 fn refuse_joint(facts: &JointFacts, channels: &Channels, log: &Recording) -> Result<()> {
     let error = |problem: String, remedy: &str, channels: &str| {
-        Err(Error::Log {
+        Err(Error::Unit {
             log: log.name.clone(),
+            unit: WrongUnit::Degrees(facts.name.clone()),
             problem,
             remedy: format!("{remedy}: × π/180, as with [columns] factor = {{ {channels} }}"),
         })

@@ -2,6 +2,7 @@
 
 use super::examine::filtered;
 use std::sync::Arc;
+use twincal::WrongUnit;
 use twincal::robot::{JointKind, Robot};
 use twincal::signal::{Log, LongLog, ReadChapter, Recording, describe};
 use twincal::words::listed;
@@ -104,41 +105,52 @@ pub(super) fn converted(
     error: &twincal::Error,
     settings: &Settings,
 ) -> Option<Converted> {
-    let twincal::Error::Log { problem, .. } = error else {
+    let twincal::Error::Unit { unit, .. } = error else {
         return None;
     };
-    let as_logged = vec![[1.0; 2]; robot.dof()];
-    if problem.contains("look like") && problem.contains("time step") {
-        for (unit, time) in [
-            ("milliseconds", TimeUnit::Ms),
-            ("microseconds", TimeUnit::Us),
-            ("nanoseconds", TimeUnit::Ns),
-        ] {
-            if problem.contains(unit) {
-                let units = Units {
-                    time: time.ticks().recip(),
-                    joints: as_logged,
-                };
-                let changed = units.of(robot, log)?;
-                let words = format!("{}: time was taken as {unit}", log.name());
-                // Other units may have to be repaired as well.
-                match describe(robot, &changed) {
-                    Err(twincal::Error::Log { problem, .. }) if problem.contains("degrees") => {}
-                    seen => drop(seen.ok()?),
-                }
-                return Some(Converted {
-                    log: changed,
-                    words,
-                    time: Some(time),
-                    degrees: None,
-                });
-            }
-        }
-        return None;
+    let (word, time) = match unit {
+        WrongUnit::Degrees(joint) => return in_radians(robot, log, joint, settings),
+        WrongUnit::Milliseconds => ("milliseconds", TimeUnit::Ms),
+        WrongUnit::Microseconds => ("microseconds", TimeUnit::Us),
+        WrongUnit::Nanoseconds => ("nanoseconds", TimeUnit::Ns),
+        _ => return None,
+    };
+    let units = Units {
+        time: time.ticks().recip(),
+        joints: vec![[1.0; 2]; robot.dof()],
+    };
+    let changed = units.of(robot, log)?;
+    // Other units may have to be repaired as well.
+    match describe(robot, &changed) {
+        Ok(_) => {}
+        Err(error) => drop(degrees_of(&error)?),
     }
-    if !problem.contains("degrees") {
-        return None;
+    Some(Converted {
+        words: format!("{}: time was taken as {word}", log.name()),
+        log: changed,
+        time: Some(time),
+        degrees: None,
+    })
+}
+
+/// The joint that is in degrees, where that is what is wrong.
+fn degrees_of(error: &twincal::Error) -> Option<&str> {
+    match error {
+        twincal::Error::Unit {
+            unit: WrongUnit::Degrees(joint),
+            ..
+        } => Some(joint),
+        _ => None,
     }
+}
+
+/// The log with all its joints taken as in degrees, or those alone that show it.
+fn in_radians(
+    robot: &Robot,
+    log: &Log<'static>,
+    joint: &str,
+    settings: &Settings,
+) -> Option<Converted> {
     let turning = |joint: &usize| robot.joint_kind(*joint) != JointKind::Prismatic;
     let turning: Vec<usize> = (0..robot.dof()).filter(turning).collect();
     for (what, factors) in [
@@ -147,7 +159,7 @@ pub(super) fn converted(
         ("positions", [DEGREE, 1.0]),
     ] {
         let all = in_degrees(robot, log, settings, factors, turning.clone());
-        let some = named(robot, problem)
+        let some = named(robot, joint)
             .and_then(|joint| in_degrees(robot, log, settings, factors, vec![joint]));
         // All of them, if the model does not explain clearly more of the torque with those alone that show it.
         let better = |some: &InDegrees| {
@@ -216,19 +228,16 @@ fn in_degrees(
                     joints,
                 });
             }
-            Err(twincal::Error::Log { problem, .. }) if problem.contains("degrees") => {
-                let next = named(robot, &problem).filter(|joint| !joints.contains(joint))?;
-                joints.push(next);
+            Err(error) => {
+                let next = named(robot, degrees_of(&error)?);
+                joints.push(next.filter(|joint| !joints.contains(joint))?);
             }
-            Err(_) => return None,
         }
     }
 }
 
-/// The joint that a problem names.
-fn named(robot: &Robot, problem: &str) -> Option<usize> {
+/// A joint by its name.
+fn named(robot: &Robot, name: &str) -> Option<usize> {
     let names = robot.joint_names();
-    names
-        .iter()
-        .position(|name| problem.contains(&format!("`{name}`")))
+    names.iter().position(|own| *own == name)
 }

@@ -3,6 +3,7 @@
 use super::calibration::{Calibration, ComponentSummary, ParameterSummary};
 use super::status::Status;
 use crate::term::Family;
+use crate::twin::Twin;
 use std::fmt;
 
 /// One effect that the data speak for: established, tentative, or one of a set that they cannot tell apart.
@@ -71,6 +72,12 @@ impl fmt::Display for Effect<'_> {
 }
 
 impl Calibration {
+    /// The calibrated twin: it predicts torque with intervals.
+    #[must_use]
+    pub fn twin(&self) -> &Twin {
+        &self.twin
+    }
+
     /// What the data speak for: established effects, then those of sets, then tentative ones, each by falling probability. Effects that are absent,
     /// or that these data cannot see, are in [`Calibration::components`].
     pub fn effects(&self) -> impl Iterator<Item = Effect<'_>> {
