@@ -1,6 +1,6 @@
 //! Is the logged velocity the derivative of the logged position (case 24)?
 
-use super::Trajectory;
+use super::trajectory::Trajectory;
 use crate::error::{Code, Finding, Severity};
 use serde::{Deserialize, Serialize};
 
@@ -83,7 +83,8 @@ pub(crate) fn findings(names: &[&str], log: &str, agreement: &[Option<Agreement>
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::signal::{Payload, Segment};
+    use crate::signal::recording::Payload;
+    use crate::signal::trajectory::Segment;
 
     /// q = sin(2t), and a velocity.
     fn agreement(velocity: impl Fn(f64) -> f64) -> Agreement {

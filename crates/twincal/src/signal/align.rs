@@ -6,10 +6,13 @@ use super::agreement::{self, velocity_agreement};
 use super::choose::{COLUMN_LIMIT, MOTION_LIMIT, require_derivatives};
 use super::fir::{column_half_seconds, motion_half_seconds};
 use super::mask::Saturated;
-use super::prepare::{JointFacts, Piece, Prepared, prepare, report_short};
+use super::pipeline::Pipeline;
+use super::prepare::{self, JointFacts, Piece, Prepared, joint_facts, report_short};
+use super::recording::{Channels, Recording};
 use super::thin::thin;
-use super::{Channels, Pipeline, Recording, Segment, Trajectory};
+use super::trajectory::{Segment, Trajectory};
 use crate::error::{Code, Error, Finding, Result, Severity};
+use crate::robot::Robot;
 use crate::words::significant;
 use segment::{Kept, as_logged, smoothed};
 use std::borrow::Cow;
@@ -62,7 +65,7 @@ impl<'a> PreparedLog<'a> {
         if every_row {
             require_derivatives(&joints, log)?;
         }
-        let pieces = prepare(
+        let pieces = prepare::prepare(
             &joints,
             log,
             every_row,
@@ -194,16 +197,59 @@ impl<'a> PreparedLog<'a> {
     /// Step 2: smooth motion, with what was found on the way; `raw`: what stays of the samples as logged.
     ///
     /// # Errors
-    /// As [`super::align`].
+    /// As [`align`].
     pub fn align(&self, pipeline: &Pipeline, raw: Raw) -> Result<(Trajectory, Vec<Finding>)> {
         let mut findings = self.findings.clone();
-        let trajectory = align(self, pipeline, raw, &mut findings)?;
+        let trajectory = filtered(self, pipeline, raw, &mut findings)?;
         Ok((trajectory, findings))
     }
 }
 
+/// One recording through steps 1 and 2 of method section 1: cut, unfold, resample, smooth, differentiate, mask.
+///
+/// Rows that are NaN or infinite are dropped and cut the log; so do steps back and gaps of more than five median steps.
+/// Uneven clocks are resampled at the median step by a cubic spline. With the pipeline off all rows stay as they are
+/// (rows that are not finite excepted).
+///
+/// # Errors
+/// [`crate::Error::Log`] if nothing usable is left or the clock is broken; the message says what to do.
+pub fn align(
+    robot: &Robot,
+    log: &Recording,
+    pipeline: &Pipeline,
+) -> Result<(Trajectory, Vec<Finding>)> {
+    prepare(robot, log, pipeline)?.align(pipeline, Raw::All)
+}
+
+/// [`align`] of a part of a log that starts at `start`, s.
+///
+/// # Errors
+/// As [`align`].
+pub(crate) fn align_part(
+    robot: &Robot,
+    part: &Recording,
+    start: Option<f64>,
+    pipeline: &Pipeline,
+) -> Result<(Trajectory, Vec<Finding>)> {
+    prepare(robot, part, pipeline)?
+        .since(start)
+        .align(pipeline, Raw::All)
+}
+
+/// Step 1 alone, for [`PreparedLog::align`] at several cut-offs up to 1.4 times that of `pipeline`.
+///
+/// # Errors
+/// As [`align`].
+pub fn prepare<'a>(
+    robot: &Robot,
+    log: &'a Recording,
+    pipeline: &Pipeline,
+) -> Result<PreparedLog<'a>> {
+    PreparedLog::new(joint_facts(robot), log, pipeline)
+}
+
 /// See [`PreparedLog::align`].
-fn align(
+fn filtered(
     ready: &PreparedLog<'_>,
     pipeline: &Pipeline,
     raw: Raw,

@@ -2,7 +2,10 @@
 //! is said once for the log, see [`told_once`].
 
 use super::clock::{GAP, median_step};
-use super::{Channels, JointHistory, LongLog, Pipeline, Recording};
+use super::history::JointHistory;
+use super::long::LongLog;
+use super::pipeline::Pipeline;
+use super::recording::{Channels, Recording};
 use crate::error::{Code, Error, Finding, Result, Severity};
 use std::ops::Range;
 

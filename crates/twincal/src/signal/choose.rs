@@ -4,12 +4,16 @@ mod filtered;
 
 use super::align::PreparedLog;
 use super::clock::even_interval;
-use super::prepare::{JointFacts, prepare};
+use super::correct::DerivedFrom;
+use super::long::{Log, Logs, LongLog};
+use super::pipeline::Pipeline;
+use super::prepare::{JointFacts, joint_facts, prepare};
+use super::ready::{LongReady, ReadyLog};
+use super::recording::Recording;
+use super::settings::{Auto, SignalSettings};
 use super::survey::{Candidates, Chapters};
-use super::{
-    Auto, DerivedFrom, Log, LongLog, LongReady, Pipeline, ReadyLog, Recording, SignalSettings,
-};
 use crate::error::{Code, Error, Finding, Result, Severity};
+use crate::robot::Robot;
 use crate::words::listed;
 use filtered::on;
 
@@ -30,7 +34,7 @@ fn setting(key: &str, problem: String, remedy: &str) -> Error {
     }
 }
 
-/// What [`super::choose_and_prepare`] gives.
+/// What [`choose_and_prepare`] gives.
 #[derive(Debug)]
 pub struct Chosen<'a> {
     /// For every log.
@@ -43,7 +47,41 @@ pub struct Chosen<'a> {
     pub logs: Vec<ReadyLog<'a>>,
 }
 
-/// See [`super::choose_and_prepare`].
+/// Chooses cut-off, rates and thresholds from the training recordings; the same pipeline then serves every log.
+///
+/// | value | rule for "auto" |
+/// |---|---|
+/// | `cutoff_hz` | max(5 Hz, 2 f_m), f_m the frequency below which 99 % of the velocity's power lies; lower where encoder noise in q̈ asks for it (`signal/cutoff.rs` states the whole rule) |
+/// | `motion_cutoff_hz` | 4 f_c, at most 0.45 of the slowest log's rate |
+/// | `rate_hz` | 2.5 f_c |
+/// | `standstill_velocity` | the largest of v_s, three standard deviations of the noise in the derivative of position after the motion filter, and 4 f_q encoder steps (two steps at once look that fast) |
+///
+/// # Errors
+/// [`crate::Error::Setting`] for numbers out of range or a cut-off above 0.4 of a log's rate; [`crate::Error::Log`] for logs that
+/// are too short or have a broken clock, and with cut-off 0 for logs without q̇ or q̈; [`crate::Error::Refused`] if every joint stands still.
+pub fn choose_pipeline(
+    robot: &Robot,
+    logs: &[Recording],
+    settings: &SignalSettings,
+) -> Result<(Pipeline, Vec<Finding>)> {
+    let logs = Logs::from(logs);
+    let chosen = choose_and_prepare(robot, &logs.0, settings)?;
+    Ok((chosen.pipeline, chosen.findings))
+}
+
+/// [`choose_pipeline`] and [`super::ready()`] in one: logs in memory are cut and unfolded once.
+///
+/// # Errors
+/// Those of both.
+pub fn choose_and_prepare<'a>(
+    robot: &Robot,
+    logs: &'a [Log<'_>],
+    settings: &SignalSettings,
+) -> Result<Chosen<'a>> {
+    choose(&joint_facts(robot), logs, settings)
+}
+
+/// See [`choose_and_prepare`].
 pub(crate) fn choose<'a>(
     joints: &[JointFacts],
     logs: &'a [Log<'_>],

@@ -1,6 +1,6 @@
 //! The clock of one log: which rows go on, where time is cut, and whether what is left ticks evenly.
 
-use super::Recording;
+use super::recording::Recording;
 use super::repeats::{Sampled, sampled};
 use crate::error::{Code, Error, Finding, Result, Severity};
 use rayon::prelude::*;

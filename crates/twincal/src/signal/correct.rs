@@ -1,6 +1,5 @@
 //! What a user says of a log's channels: torque that comes later than the motion, a velocity that is not to be used.
 
-use super::DerivedFrom;
 use super::prepare::{JointFacts, Values};
 use super::spline::resample;
 use crate::error::{Error, Result};
@@ -11,6 +10,16 @@ use std::ops::Range;
 
 /// Largest lag that is believed, s.
 const LARGEST: f64 = 1.0;
+
+/// What a velocity that is noisy, or an acceleration that is not logged, is derived from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum DerivedFrom {
+    /// Position.
+    Position,
+    /// Logged velocity.
+    Velocity,
+}
 
 /// How much later than the motion torque is logged.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]

@@ -12,7 +12,7 @@
 //!
 //! [`wider`] is four times that where rules 3 and 4 hold there, too.
 
-use super::DerivedFrom;
+use super::correct::DerivedFrom;
 use super::prepare::Prepared;
 use super::spectrum::{Noise, Spectrum};
 use rayon::prelude::*;

@@ -1,9 +1,11 @@
 //! What a log holds, before anything is fitted: rates, cuts, motion and torque per joint.
 
 use super::clock::GAP;
+use super::correct::Corrections;
+use super::long::{Log, Logs};
 use super::prepare::{JointFacts, Piece, Values, joint_facts, prepare};
+use super::recording::Recording;
 use super::travel::LONGEST;
-use super::{Corrections, Log, Logs, Recording};
 use crate::error::{Code, Finding, Result, Severity};
 use crate::robot::Robot;
 use crate::words::significant;

@@ -1,11 +1,12 @@
 //! What an encoder can tell: its step, and the noise that it leaves in velocity and acceleration.
 
+use super::correct::DerivedFrom;
 use super::cutoff::JointSpectra;
 use super::fir::{MotionKernels, noise_gain};
+use super::pipeline::Pipeline;
 use super::prepare::JointFacts;
 use super::spectrum::Noise;
 use super::travel::usual_size;
-use super::{DerivedFrom, Pipeline};
 use crate::error::{Code, Finding, Severity};
 use crate::words::significant;
 

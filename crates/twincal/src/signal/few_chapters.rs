@@ -1,6 +1,6 @@
 //! The motion of a few chapters of a long log: what looks at a log as it was recorded needs no more.
 
-use super::Trajectory;
+use super::trajectory::Trajectory;
 
 /// Chapters whose motion is kept, and samples of them together, about: raw scores, the lag and the self-check look at no more.
 const CHAPTERS: usize = 16;

@@ -1,6 +1,7 @@
 //! Torque that holds its value while its joint moves: a stale value, or a drive that publishes it a few times a second.
 
-use super::{Channels, Logs, Recording};
+use super::long::Logs;
+use super::recording::{Channels, Recording};
 use crate::error::Code;
 use crate::error::{Finding, Result, Severity};
 use crate::robot::Robot;

@@ -12,7 +12,9 @@
 //! # Source
 //! Brokate & Sprekels 1996, section 2.3 (stop and play, Prandtl–Ishlinskii); Al-Bender, Lampaert, Swevers 2005 (Maxwell slip).
 
-use super::{Pipeline, Recording, Trajectory};
+use super::pipeline::Pipeline;
+use super::recording::Recording;
+use super::trajectory::Trajectory;
 use crate::error::{Code, Finding, Severity};
 use crate::lanes::tanh;
 use rayon::prelude::*;

@@ -3,9 +3,9 @@
 //! One wrong sample in a hundred thousand raises the noise that an encoder seems to have so far that slow motion passes
 //! for standstill, and rings through every filter.
 
-use super::Recording;
 use super::clock::{Clock, Run};
 use super::prepare::JointFacts;
+use super::recording::Recording;
 use super::travel::{count, median};
 use crate::error::Code;
 use crate::error::{Finding, Severity};

@@ -4,8 +4,9 @@
 //! Angles are unfolded as those of the whole log.
 
 use super::align::first_stamp;
+use super::recording::{Payload, Recording};
+use super::shelf::Shelf;
 use super::unwrap::Folding;
-use super::{Payload, Recording, Shelf};
 use crate::error::{Error, Result};
 use crate::robot::Robot;
 use std::borrow::Cow;

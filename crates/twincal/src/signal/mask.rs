@@ -1,8 +1,10 @@
 //! Takes samples with saturated torque out of the fit, with those whose filter sees them, and says so (case 26).
 
+use super::pipeline::Pipeline;
 use super::prepare::JointFacts;
+use super::recording::{Channels, Recording};
 use super::saturation::flat_runs;
-use super::{Channels, Pipeline, Recording, Trajectory};
+use super::trajectory::Trajectory;
 use crate::error::{Code, Finding, Severity};
 use rayon::prelude::*;
 use std::ops::Range;

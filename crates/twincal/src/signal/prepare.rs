@@ -1,13 +1,13 @@
 //! One log on even clocks: cut, unfolded, resampled where the clock is uneven; nothing filtered yet.
 
-use super::DerivedFrom;
 use super::clock::{Clock, Run, even_interval, read_clock, report_jitter};
+use super::correct::{Corrections, DerivedFrom};
 use super::jumps::cut_jumps;
+use super::recording::{Channels, Recording};
 use super::spline::resample;
 use super::standstill::span;
 use super::units::refuse_degrees;
 use super::unwrap::{unfolded, unwrap_angle};
-use super::{Channels, Corrections, Recording};
 use crate::error::{Code, Error, Finding, Result, Severity};
 use crate::robot::{JointKind, Robot};
 use rayon::prelude::*;

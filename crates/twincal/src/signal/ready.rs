@@ -1,11 +1,15 @@
 //! A log that is ready for any cut-off: prepared in memory, or prepared again chapter by chapter whenever it is visited.
 
+use super::align::PreparedLog;
 use super::clock::median_step;
-use super::prepare::JointFacts;
-use super::{Log, LongLog, Payload, Pipeline, PreparedLog};
+use super::long::{Log, LongLog};
+use super::pipeline::Pipeline;
+use super::prepare::{JointFacts, joint_facts};
+use super::recording::Payload;
 use crate::error::{Finding, Result};
+use crate::robot::Robot;
 
-/// See [`super::choose_and_prepare`].
+/// A log as [`super::choose_and_prepare`] gives it.
 #[derive(Debug)]
 pub enum ReadyLog<'a> {
     /// In memory.
@@ -21,6 +25,14 @@ pub struct LongReady {
     pub(crate) joints: Vec<JointFacts>,
     /// Sampling interval, s.
     pub(crate) interval: f64,
+}
+
+/// [`super::prepare()`] of a log that may be in chapters.
+///
+/// # Errors
+/// As [`super::align()`], and of chapters that cannot be read.
+pub fn ready<'a>(robot: &Robot, log: &'a Log<'_>, pipeline: &Pipeline) -> Result<ReadyLog<'a>> {
+    ReadyLog::new(&joint_facts(robot), log, pipeline)
 }
 
 impl<'a> ReadyLog<'a> {

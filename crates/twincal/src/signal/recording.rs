@@ -1,7 +1,58 @@
-//! Recordings put together from arrays.
+//! What a recording is: time stamps and the channels of every joint, as they were read or put together from arrays.
 
-use super::{Channels, Payload, Recording};
 use crate::error::{Error, Result};
+use serde::{Deserialize, Serialize};
+
+/// One joint's channels as logged, SI units, all of the recording's length.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Channels {
+    /// rad or m.
+    pub q: Vec<f64>,
+    /// rad/s or m/s, if logged.
+    pub qd: Option<Vec<f64>>,
+    /// rad/s² or m/s², if logged.
+    pub qdd: Option<Vec<f64>>,
+    /// N·m or N; absent for a log that is only to be predicted.
+    pub tau: Option<Vec<f64>>,
+    /// Temperature of the drive, °C or K, if logged; NaN where it is not known. It explains drift and nothing else.
+    pub temperature: Option<Vec<f64>>,
+}
+
+/// What a robot carried in a log, beyond its model.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Payload {
+    /// Nothing that the model does not have.
+    #[default]
+    None,
+    /// A point mass (a body whose own tensor is left out) at a known place.
+    Known {
+        /// kg.
+        mass: f64,
+        /// Centre of mass in the payload frame, m.
+        com: [f64; 3],
+    },
+    /// Something: mass and centre of mass are to be found in these logs.
+    Unknown,
+}
+
+/// A log as read: joints already matched to the robot's q1…qn, values untouched (NaN included).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Recording {
+    /// Whether angles are unfolded already, or known not to be folded, by what the whole log shows: they are left as they are then.
+    pub unfolded: bool,
+    /// Name as given by the user.
+    pub name: String,
+    /// Time stamps, s from [`Recording::start_ns`] on.
+    pub time: Vec<f64>,
+    /// Where time counts from, ns: 0 for a log whose stamps are in `time` as they are, of a bag the first stamp (ns since 1970), which
+    /// a double would round to 0.2 µs.
+    pub start_ns: i64,
+    /// One entry per moving joint of the robot, in order.
+    pub joints: Vec<Channels>,
+    /// What the robot carried.
+    pub payload: Payload,
+}
 
 impl Recording {
     /// A recording without joints yet: `time` are its stamps, s.
@@ -125,6 +176,22 @@ impl Recording {
             problem: format!("joint {joint} has {count} {what} for {stamps} stamps"),
             remedy: "give one value for each stamp, NaN where it is not known".into(),
         })
+    }
+
+    /// A log can be predicted without torque, not fitted and not scored. `names`: moving joints in order.
+    ///
+    /// # Errors
+    /// [`Error::Log`] naming the first joint without.
+    pub fn require_torque(&self, names: &[&str]) -> Result<()> {
+        let without = |(channels, _): &(&Channels, &&str)| channels.tau.is_none();
+        match self.joints.iter().zip(names).find(without) {
+            Some((_, name)) => Err(Error::Log {
+                log: self.name.clone(),
+                problem: format!("has no torque of joint `{name}`"),
+                remedy: "measured torque is needed here; name its column in [columns] tau, and say torque = \"current\" in [[log]] if it is a current".into(),
+            }),
+            None => Ok(()),
+        }
     }
 }
 

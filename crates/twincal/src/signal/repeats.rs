@@ -5,9 +5,9 @@
 //! channel, and are left alone.
 
 use super::clock::Cut;
+use super::recording::{Channels, Recording};
 use super::ticks::{Ticks, ticks};
 use super::travel::{Rows, Travel};
-use super::{Channels, Recording};
 use crate::error::{Code, Finding, Severity};
 use crate::words::significant;
 use std::ops::Range;

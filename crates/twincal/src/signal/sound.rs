@@ -1,8 +1,9 @@
 //! Whether a pipeline that was read from a file is one that a choice of filters gives.
 
 use super::history::JointHistory;
+use super::pipeline::Pipeline;
 use super::thin::coarsest;
-use super::{Pipeline, fir, prepare};
+use super::{fir, prepare};
 use crate::robot::Robot;
 use std::fmt::Debug;
 

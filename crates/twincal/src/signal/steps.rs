@@ -1,7 +1,7 @@
 //! What the channels of a log resolve: the step by which each of them changes (case 27).
 
-use super::Log;
 use super::encoder::quantum;
+use super::long::Log;
 use crate::error::Result;
 use crate::robot::Robot;
 use rayon::prelude::*;

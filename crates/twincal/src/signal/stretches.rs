@@ -1,9 +1,10 @@
 //! Evenly spread stretches of a log: what is asked of a log's motion but not row by row needs no more.
 
 use super::align::{PreparedLog, Raw};
+use super::pipeline::Pipeline;
 use super::ready::{LongReady, ReadyLog};
 use super::thin::factor;
-use super::{Pipeline, Trajectory};
+use super::trajectory::Trajectory;
 use crate::error::Result;
 use std::ops::Range;
 

@@ -2,9 +2,11 @@
 
 use super::cutoff::{JointSpectra, spectra};
 use super::encoder::quantum;
+use super::long::LongLog;
 use super::prepare::{JointFacts, Piece, Prepared, prepare};
+use super::recording::{Channels, Recording};
+use super::settings::SignalSettings;
 use super::steps::{changes, common_step};
-use super::{Channels, LongLog, Recording, SignalSettings};
 use crate::error::{Finding, Result};
 use rayon::prelude::*;
 

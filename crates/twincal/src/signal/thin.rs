@@ -7,10 +7,11 @@
 
 use super::decimate::Decimator;
 use super::fir::thinning_kernel;
+use super::pipeline::Pipeline;
 #[cfg(test)]
 use super::prepare::Values;
 use super::prepare::{Piece, Prepared};
-use super::{Pipeline, Trajectory};
+use super::trajectory::Trajectory;
 use rayon::prelude::*;
 use std::borrow::Cow;
 

@@ -1,7 +1,8 @@
 //! What measured torque lacks: samples of it, or any change in it.
 
 use super::held::held_torque;
-use super::{Channels, Log, Logs, Recording};
+use super::long::{Log, Logs};
+use super::recording::{Channels, Recording};
 use crate::error::{Code, Finding, Result, Severity};
 use crate::robot::Robot;
 

@@ -1,7 +1,7 @@
 //! Degrees where radians are meant, as far as motion and joint limits alone can tell (case 18).
 
 use super::prepare::JointFacts;
-use super::{Channels, Recording};
+use super::recording::{Channels, Recording};
 use crate::error::{Error, Result};
 use crate::robot::JointKind;
 use rayon::prelude::*;

@@ -1,7 +1,8 @@
 //! Angles that a counter folded into one turn, unfolded.
 
 use super::clock::{GAP, median_step};
-use super::{ReadChapter, Recording};
+use super::long::ReadChapter;
+use super::recording::Recording;
 use crate::error::{Code, Finding, Result, Severity};
 use crate::robot::{JointKind, Robot};
 use rayon::prelude::*;

@@ -2,10 +2,12 @@
 
 use super::{PreparedLog, Raw};
 use crate::signal::convolve::{correlate, correlate_two};
+use crate::signal::correct::DerivedFrom;
 use crate::signal::fir::{MotionKernels, motion_half_samples};
+use crate::signal::pipeline::Pipeline;
 use crate::signal::prepare::{Piece, Values, pick};
 use crate::signal::standstill::{at_rest, slower_than};
-use crate::signal::{DerivedFrom, LoggedSamples, Pipeline, Segment};
+use crate::signal::trajectory::{LoggedSamples, Segment};
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::ops::Range;

@@ -2,15 +2,17 @@
 
 use super::{COLUMN_LIMIT, COULOMB_VELOCITY, FEWEST_ROWS, MOTION_LIMIT, setting, unexcited};
 use crate::error::{Code, Error, Finding, Result, Severity};
+use crate::signal::correct::DerivedFrom;
 use crate::signal::cutoff::{
     JointSpectra, automatic, derived_from, motion_band, noisy_velocity, rms_acceleration, wider,
 };
 use crate::signal::encoder::{Encoder, velocity_resolution};
 use crate::signal::fir::{column_half_seconds, column_kernel, motion_half_seconds, noise_gain};
+use crate::signal::pipeline::Pipeline;
 use crate::signal::prepare::JointFacts;
+use crate::signal::settings::{Auto, SignalSettings};
 use crate::signal::survey::{Candidates, Survey};
 use crate::signal::thin::{coarsest, factor};
-use crate::signal::{Auto, DerivedFrom, Pipeline, SignalSettings};
 use crate::words::significant;
 use rayon::prelude::*;
 

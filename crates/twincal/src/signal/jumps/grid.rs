@@ -3,7 +3,7 @@
 use super::*;
 use crate::error::Code;
 use crate::robot::JointKind;
-use crate::signal::Corrections;
+use crate::signal::correct::Corrections;
 use crate::signal::prepare::prepare;
 use crate::signal::worlds::{JOINTS, MOTIONS, World};
 use rand::{RngExt, SeedableRng};

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::robot::JointKind;
-use crate::signal::Corrections;
+use crate::signal::correct::Corrections;
 use crate::signal::prepare::{JointFacts, Prepared, prepare};
 use crate::signal::worlds::{JOINTS, MOTIONS, Motion, World, normal, polled, rows_of};
 use rand::{RngExt, SeedableRng};
