@@ -1,199 +1,24 @@
 //! One recording through the motion filter: segments of smooth motion, raw torque and standstill flags.
 
-mod segment;
-
 use super::agreement::{self, velocity_agreement};
-use super::choose::{COLUMN_LIMIT, MOTION_LIMIT, require_derivatives};
 use super::fir::{column_half_seconds, motion_half_seconds};
-use super::mask::Saturated;
-use super::pipeline::Pipeline;
-use super::prepare::{self, JointFacts, Piece, Prepared, joint_facts, report_short};
-use super::recording::{Channels, Recording};
-use super::thin::thin;
+use super::joints::JointFacts;
+use super::pipeline::{COLUMN_LIMIT, MOTION_LIMIT, Pipeline};
+use super::prepare::report_short;
+use super::prepared_log::{PreparedLog, Raw, prepare};
+use super::recording::Recording;
+use super::segment::{Kept, as_logged, smoothed};
 use super::trajectory::{Segment, Trajectory};
 use crate::error::{Code, Error, Finding, Result, Severity};
 use crate::robot::Robot;
 use crate::words::significant;
-use segment::{Kept, as_logged, smoothed};
-use std::borrow::Cow;
-use std::ops::Range;
-
-/// Standstill has to last for this many periods of the cut-off.
-pub(super) const STANDSTILL_PERIODS: f64 = 3.0;
 
 /// Share of standstill from which a joint counts as not moving in a log.
 const HARDLY_MOVES: f64 = 0.95;
 /// In v_s, from which speed on "standing still" would be no word for what is slower.
 const SLOW: f64 = 10.0;
 
-/// What a segment keeps of samples as logged where its motion has a coarser clock.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Raw {
-    /// None: for filtered rows alone.
-    None,
-    /// Evenly spread stretches, about 65 536 samples of a log: enough for a standard deviation or a coverage.
-    Spread,
-    /// All.
-    All,
-}
-
-/// A log cut, unfolded and on even clocks, ready for any cut-off up to 1.4 times that of the pipeline it was made for.
-#[derive(Debug)]
-pub struct PreparedLog<'a> {
-    log: Cow<'a, Recording>,
-    joints: Vec<JointFacts>,
-    pieces: Prepared<'a>,
-    saturated: Saturated,
-    /// What each joint's position spans at most at rest, rad or m.
-    at_rest: Vec<f64>,
-    /// Time between cuts, before anything is thinned, s.
-    seconds: f64,
-    /// First stamp of the log that this is, or is a part of, s.
-    start: f64,
-    findings: Vec<Finding>,
-}
-
-impl<'a> PreparedLog<'a> {
-    /// Step 1 of method section 1.
-    pub(crate) fn new(
-        joints: Vec<JointFacts>,
-        log: &'a Recording,
-        pipeline: &Pipeline,
-    ) -> Result<Self> {
-        let mut findings = Vec::new();
-        let every_row = pipeline.is_off();
-        if every_row {
-            require_derivatives(&joints, log)?;
-        }
-        let pieces = prepare::prepare(
-            &joints,
-            log,
-            every_row,
-            &pipeline.corrections,
-            &mut findings,
-        )?;
-        Ok(Self::of(joints, log, pieces, findings, pipeline))
-    }
-
-    /// The same from pieces that are there already, with what was found in them.
-    pub(crate) fn of(
-        joints: Vec<JointFacts>,
-        log: &'a Recording,
-        mut pieces: Prepared<'a>,
-        mut findings: Vec<Finding>,
-        pipeline: &Pipeline,
-    ) -> Self {
-        let (at_rest, seconds) = (pieces.at_rest(log), pieces.seconds());
-        if !pipeline.is_off() {
-            let (short, rows) = thin(&mut pieces, pipeline);
-            report_short(log, short, rows, &mut findings);
-        }
-        Self {
-            saturated: Saturated::find(&joints, log, pipeline),
-            at_rest,
-            seconds,
-            start: first_stamp(log).unwrap_or(0.0),
-            log: Cow::Borrowed(log),
-            joints,
-            pieces,
-            findings,
-        }
-    }
-
-    /// The same as a part of a log that starts at another time, s.
-    #[must_use]
-    pub(crate) fn since(self, start: Option<f64>) -> Self {
-        Self {
-            start: start.unwrap_or(self.start),
-            ..self
-        }
-    }
-
-    /// The log itself.
-    pub fn recording(&self) -> &Recording {
-        &self.log
-    }
-
-    /// Interval of the clock at which motion is held, s.
-    pub(super) fn interval(&self) -> f64 {
-        let pieces = self.pieces.pieces.first();
-        pieces.map_or(self.pieces.interval, |piece| piece.interval)
-    }
-
-    /// Samples of each piece.
-    pub(super) fn lengths(&self) -> Vec<usize> {
-        let pieces = self.pieces.pieces.iter();
-        pieces.map(|piece| piece.time.len()).collect()
-    }
-
-    /// Some stretches of it, each a piece of its own: (piece, samples).
-    pub(super) fn cut(&self, stretches: &[(usize, Range<usize>)]) -> PreparedLog<'_> {
-        let piece =
-            |(piece, range): &(usize, Range<usize>)| self.pieces.pieces[*piece].lent(range.clone());
-        PreparedLog {
-            log: Cow::Borrowed(&self.log),
-            joints: self.joints.clone(),
-            pieces: Prepared {
-                time: None,
-                interval: self.pieces.interval,
-                pieces: stretches.iter().map(piece).collect(),
-            },
-            saturated: self.saturated.clone(),
-            at_rest: self.at_rest.clone(),
-            seconds: self.seconds,
-            start: self.start,
-            findings: Vec::new(),
-        }
-    }
-
-    /// Samples of all pieces, on the clock at which motion is held.
-    pub fn samples(&self) -> usize {
-        self.lengths().iter().sum()
-    }
-
-    /// Rows that a fit with this pipeline keeps at most: filters trim the ends of pieces.
-    pub fn rows_at_most(&self, pipeline: &Pipeline) -> usize {
-        let pieces = self.pieces.pieces.iter();
-        pieces
-            .map(|piece| piece.time.len().div_ceil(pipeline.step(piece.interval)))
-            .sum()
-    }
-
-    /// What [`Raw::None`] needs, without the recording: of that only its name and its load are left, and which channels it had.
-    #[must_use]
-    pub fn detached(self) -> PreparedLog<'static> {
-        let channels = self.log.joints.iter().map(|joint| Channels {
-            q: Vec::new(),
-            qd: joint.qd.as_ref().map(|_| Vec::new()),
-            qdd: joint.qdd.as_ref().map(|_| Vec::new()),
-            tau: joint.tau.as_ref().map(|_| Vec::new()),
-            temperature: None,
-        });
-        PreparedLog {
-            log: Cow::Owned(Recording {
-                unfolded: self.log.unfolded,
-                start_ns: self.log.start_ns,
-                name: self.log.name.clone(),
-                time: Vec::new(),
-                joints: channels.collect(),
-                payload: self.log.payload,
-            }),
-            joints: self.joints,
-            pieces: Prepared {
-                time: None,
-                interval: self.pieces.interval,
-                pieces: (self.pieces.pieces.into_iter())
-                    .map(Piece::into_owned)
-                    .collect(),
-            },
-            saturated: self.saturated,
-            at_rest: self.at_rest,
-            seconds: self.seconds,
-            start: self.start,
-            findings: self.findings,
-        }
-    }
-
+impl PreparedLog<'_> {
     /// Step 2: smooth motion, with what was found on the way; `raw`: what stays of the samples as logged.
     ///
     /// # Errors
@@ -234,18 +59,6 @@ pub(crate) fn align_part(
     prepare(robot, part, pipeline)?
         .since(start)
         .align(pipeline, Raw::All)
-}
-
-/// Step 1 alone, for [`PreparedLog::align`] at several cut-offs up to 1.4 times that of `pipeline`.
-///
-/// # Errors
-/// As [`align`].
-pub fn prepare<'a>(
-    robot: &Robot,
-    log: &'a Recording,
-    pipeline: &Pipeline,
-) -> Result<PreparedLog<'a>> {
-    PreparedLog::new(joint_facts(robot), log, pipeline)
 }
 
 /// See [`PreparedLog::align`].
@@ -392,11 +205,6 @@ fn report_agreement(
         *agreement = agreement.filter(|_| channels.qd.is_some());
     }
     findings.extend(agreement::findings(&names, &log.name, &agreement));
-}
-
-/// First stamp of a log, s.
-pub(super) fn first_stamp(log: &Recording) -> Option<f64> {
-    log.time.iter().copied().find(|time| time.is_finite())
 }
 
 /// Says how much of the log each joint is at rest.

@@ -1,38 +1,20 @@
 //! Replaces every "auto" of the signal settings by a number that the training logs justify.
 
-mod filtered;
-
-use super::align::PreparedLog;
-use super::clock::even_interval;
 use super::correct::DerivedFrom;
+use super::filtered::on;
+use super::joints::{JointFacts, joint_facts};
 use super::long::{Log, Logs, LongLog};
 use super::pipeline::Pipeline;
-use super::prepare::{JointFacts, joint_facts, prepare};
+use super::prepare::prepare;
+use super::prepared_log::{PreparedLog, require_derivatives};
 use super::ready::{LongReady, ReadyLog};
 use super::recording::Recording;
 use super::settings::{Auto, SignalSettings};
+use super::stamps::even_interval;
 use super::survey::{Candidates, Chapters};
+use super::unexcited::unexcited;
 use crate::error::{Code, Error, Finding, Result, Severity};
 use crate::robot::Robot;
-use crate::words::listed;
-use filtered::on;
-
-/// v_s where the pipeline is on and nothing is said, rad/s or m/s.
-const COULOMB_VELOCITY: f64 = 0.02;
-/// Motion filter's highest cut-off as a share of the log's rate.
-pub(crate) const MOTION_LIMIT: f64 = 0.45;
-/// Column filter's highest cut-off as a share of the log's rate: 2.5 f_c is then the rate itself.
-pub(crate) const COLUMN_LIMIT: f64 = 0.4;
-/// Kept rows that the longest segment must give at least.
-const FEWEST_ROWS: f64 = 10.0;
-
-fn setting(key: &str, problem: String, remedy: &str) -> Error {
-    Error::Setting {
-        key: key.into(),
-        problem,
-        remedy: remedy.into(),
-    }
-}
 
 /// What [`choose_and_prepare`] gives.
 #[derive(Debug)]
@@ -87,7 +69,7 @@ pub(crate) fn choose<'a>(
     logs: &'a [Log<'_>],
     settings: &SignalSettings,
 ) -> Result<Chosen<'a>> {
-    check_settings(settings)?;
+    settings.check()?;
     if logs.is_empty() {
         return Err(Error::Refused {
             problem: "no training log".into(),
@@ -160,75 +142,6 @@ fn needs_a_filter(long: &LongLog) -> Error {
     }
 }
 
-fn check_settings(settings: &SignalSettings) -> Result<()> {
-    let positive = |key: &str, value: f64, zero: bool| {
-        if value.is_finite() && (value > 0.0 || zero && value == 0.0) {
-            return Ok(());
-        }
-        Err(setting(
-            key,
-            format!("{value} is out of range"),
-            "give a number above 0",
-        ))
-    };
-    if let Auto::Value(value) = settings.cutoff_hz {
-        positive("signal.cutoff_hz", value, true)?;
-    }
-    if let Auto::Value(value) = settings.rate_hz {
-        positive("signal.rate_hz", value, false)?;
-    }
-    settings.coulomb_velocity.map_or(Ok(()), |value| {
-        positive("library.coulomb_velocity", value, true)
-    })
-}
-
-/// `limits`: how fast a joint must be to count as moving, rad/s or m/s; empty with the filter off.
-fn unexcited(joints: &[JointFacts], still: &[bool], limits: &[f64]) -> Result<Vec<Finding>> {
-    let names = |wanted: bool| -> Vec<String> {
-        joints
-            .iter()
-            .enumerate()
-            .filter(|(joint, _)| still[*joint] == wanted)
-            .map(|(joint, facts)| match limits.get(joint) {
-                Some(limit) => format!("`{}` below {limit:.3} rad/s (m/s)", facts.name),
-                None => format!("`{}`", facts.name),
-            })
-            .collect()
-    };
-    if names(false).is_empty() {
-        return Err(Error::Refused {
-            problem: format!(
-                "no excitation: every joint is at rest in all training logs ({})",
-                listed(names(true), ", ")
-            ),
-            remedy: if limits.iter().any(|limit| *limit > COULOMB_VELOCITY) {
-                "a coarse encoder cannot distinguish slower motion from rest: record faster motion, log the velocity, or \
-                 lower [signal] cutoff_hz"
-                    .into()
-            } else {
-                "record logs in which the joints move".into()
-            },
-        });
-    }
-    Ok(joints
-        .iter()
-        .zip(still)
-        .filter(|(_, still)| **still)
-        .map(|(joint, _)| {
-            Finding::new(
-                Severity::Warning,
-                Code::JointNotExcited,
-                &joint.name,
-                format!(
-                    "joint `{}` is at rest in all training logs: its own effects cannot be seen",
-                    joint.name
-                ),
-                0,
-            )
-        })
-        .collect())
-}
-
 /// Pipeline off: rows are the input rows, so motion has to be complete.
 fn off(
     joints: &[JointFacts],
@@ -280,26 +193,4 @@ fn off(
         history: Vec::new(),
     };
     Ok((pipeline, findings))
-}
-
-/// With the filter off nothing is differentiated.
-pub(crate) fn require_derivatives(joints: &[JointFacts], log: &Recording) -> Result<()> {
-    for (channels, joint) in log.joints.iter().zip(joints) {
-        for (missing, what) in [
-            (channels.qd.is_none(), "velocity"),
-            (channels.qdd.is_none(), "acceleration"),
-        ] {
-            if missing {
-                return Err(Error::Log {
-                    log: log.name.clone(),
-                    problem: format!(
-                        "joint `{}` has no {what} and cutoff_hz = 0 differentiates nothing",
-                        joint.name
-                    ),
-                    remedy: "log it, or set [signal] cutoff_hz to \"auto\" or a number".into(),
-                });
-            }
-        }
-    }
-    Ok(())
 }

@@ -1,12 +1,11 @@
 //! The clock of one log: which rows go on, where time is cut, and whether what is left ticks evenly.
 
 use super::recording::Recording;
-use super::repeats::{Sampled, sampled};
+use super::repeats::{Cut, Sampled, sampled};
+use super::stamps::{GAP, median_positive};
 use crate::error::{Code, Error, Finding, Result, Severity};
 use rayon::prelude::*;
 
-/// A step longer than this many median intervals is a gap: the log is cut there.
-pub(crate) const GAP: f64 = 5.0;
 /// Share of intervals' deviation (99 % of them) beyond which a jitter warning is given.
 const JITTER: f64 = 0.2;
 /// Stamps closer than this share of the median interval are one sample, seen twice.
@@ -17,8 +16,6 @@ const NOT_FINITE_LIMIT: f64 = 0.01;
 const LARGEST: f64 = 1e12;
 /// Share of contradicting duplicates beyond which the log counts as degraded.
 const CONTRADICTION_LIMIT: f64 = 0.001;
-/// Largest distance from an even grid, in intervals, that still counts as even.
-const EVEN: f64 = 1e-3;
 
 /// Rows of a log without a cut between them.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -43,18 +40,6 @@ impl Clock {
     pub(crate) fn stamp(&self, log: &Recording, row: usize) -> f64 {
         self.sampled.time.as_ref().unwrap_or(&log.time)[row]
     }
-}
-
-/// Rows that may go on.
-pub(crate) struct Cut<'a> {
-    /// Ascending indices into the recording.
-    pub(crate) kept: &'a [usize],
-    /// Whether rows were dropped right before each of them.
-    pub(crate) before: &'a [bool],
-    /// Median step, s.
-    pub(crate) interval: f64,
-    /// The pipeline is off.
-    pub(crate) every_row: bool,
 }
 
 fn log_error(log: &Recording, problem: impl Into<String>, remedy: impl Into<String>) -> Error {
@@ -235,17 +220,6 @@ fn slower_channels(kept: &[usize], samples: usize) -> Option<usize> {
     (regular * 10 >= sorted.len() * 9 && kept.len() * every * 5 > samples * 4).then_some(every)
 }
 
-/// Median of the steps between stamps that go forward, s; `None` where time does not pass.
-pub(crate) fn median_step(time: &[f64]) -> Option<f64> {
-    median_positive(time.windows(2).map(|pair| pair[1] - pair[0]))
-}
-
-fn median_positive(steps: impl Iterator<Item = f64>) -> Option<f64> {
-    let mut steps: Vec<f64> = steps.filter(|step| *step > 0.0).collect();
-    let middle = steps.len() / 2;
-    (!steps.is_empty()).then(|| *steps.select_nth_unstable_by(middle, f64::total_cmp).1)
-}
-
 /// [`median_step`] of the rows that are kept, if it is plausible.
 fn median_interval(
     log: &Recording,
@@ -406,46 +380,6 @@ fn cut(
         say(Severity::Note, Code::Gaps, text, gaps);
     }
     runs
-}
-
-/// The interval if the stamps are an even grid, or one that was rounded to decimals; else `None`.
-pub(crate) fn even_interval(time: &[f64]) -> Option<f64> {
-    let n = time.len();
-    if n < 2 {
-        return None;
-    }
-    let (mut interval, mut offset) = ((time[n - 1] - time[0]) / (n - 1) as f64, 0.0);
-    // Least-squares line through the stamps, in two rounds for rounding's sake.
-    let middle = (n - 1) as f64 / 2.0;
-    let spread = (n as f64) * ((n as f64).powi(2) - 1.0) / 12.0;
-    for _ in 0..2 {
-        let (mut sum, mut moment) = (0.0, 0.0);
-        for (i, t) in time.iter().enumerate() {
-            let rest = t - time[0] - offset - interval * i as f64;
-            sum += rest;
-            moment += rest * (i as f64 - middle);
-        }
-        interval += moment / spread;
-        offset += sum / n as f64 - moment / spread * middle;
-    }
-    let worst = time
-        .iter()
-        .enumerate()
-        .map(|(i, t)| (t - time[0] - offset - interval * i as f64).abs())
-        .fold(0.0, f64::max);
-    if worst <= EVEN * interval {
-        return Some(interval);
-    }
-    // Stamps printed with few decimals: the whole deviation is less than half a unit of the last one.
-    let quantum = (0..=9)
-        .map(|digits| 10.0_f64.powi(-digits))
-        .find(|quantum| {
-            time.iter().all(|t| {
-                let units = t / quantum;
-                (units - units.round()).abs() < 1e-6 * units.abs().max(1.0).sqrt()
-            })
-        })?;
-    (worst <= 0.51 * quantum && interval > 1.5 * quantum).then_some(interval)
 }
 
 /// "12", "0.35", "0.0021": two digits, however small.

@@ -1,6 +1,7 @@
 //! What a user says of a log's channels: torque that comes later than the motion, a velocity that is not to be used.
 
-use super::prepare::{JointFacts, Values};
+use super::joints::JointFacts;
+use super::pieces::Values;
 use super::spline::resample;
 use crate::error::{Error, Result};
 use crate::robot::did_you_mean;

@@ -13,7 +13,7 @@
 //! [`wider`] is four times that where rules 3 and 4 hold there, too.
 
 use super::correct::DerivedFrom;
-use super::prepare::Prepared;
+use super::pieces::Prepared;
 use super::spectrum::{Noise, Spectrum};
 use rayon::prelude::*;
 use std::f64::consts::PI;

@@ -1,10 +1,12 @@
 //! What a log holds, before anything is fitted: rates, cuts, motion and torque per joint.
 
-use super::clock::GAP;
 use super::correct::Corrections;
+use super::joints::{JointFacts, joint_facts};
 use super::long::{Log, Logs};
-use super::prepare::{JointFacts, Piece, Values, joint_facts, prepare};
+use super::pieces::{Piece, Values};
+use super::prepare::prepare;
 use super::recording::Recording;
+use super::stamps::GAP;
 use super::travel::LONGEST;
 use crate::error::{Code, Finding, Result, Severity};
 use crate::robot::Robot;

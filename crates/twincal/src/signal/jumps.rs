@@ -4,7 +4,7 @@
 //! for standstill, and rings through every filter.
 
 use super::clock::{Clock, Run};
-use super::prepare::JointFacts;
+use super::joints::JointFacts;
 use super::recording::Recording;
 use super::travel::{count, median};
 use crate::error::Code;
@@ -264,7 +264,7 @@ fn tell(joints: &[JointFacts], log: &Recording, found: &Found, every_row: bool) 
 }
 
 #[cfg(test)]
-mod grid;
+mod grid_tests;
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -3,32 +3,15 @@
 //! For a fit a chapter ends as a log does: filters need some seconds at either end of it, which become no rows (`chapters.rs` visits them).
 //! Angles are unfolded as those of the whole log.
 
-use super::align::first_stamp;
+use super::read_chapter::ReadChapter;
 use super::recording::{Payload, Recording};
 use super::shelf::Shelf;
+use super::stamps::first_stamp;
 use super::unwrap::Folding;
 use crate::error::{Error, Result};
 use crate::robot::Robot;
 use std::borrow::Cow;
-use std::fmt::Debug;
 use std::sync::Arc;
-
-/// Where the chapters of a log come from.
-pub trait ReadChapter: Debug + Send + Sync {
-    /// Chapter number `chapter`, counted from 0; its name and what was carried do not matter.
-    ///
-    /// # Errors
-    /// [`Error::Log`] where it cannot be read again.
-    fn read(&self, chapter: usize) -> Result<Recording>;
-
-    /// The positions of one joint in a chapter, as [`ReadChapter::read`] gives them.
-    ///
-    /// # Errors
-    /// Those of [`ReadChapter::read`].
-    fn positions(&self, chapter: usize, joint: usize) -> Result<Vec<f64>> {
-        Ok(std::mem::take(&mut self.read(chapter)?.joints[joint].q))
-    }
-}
 
 /// A log in chapters: all have the same joints and the same channels.
 #[derive(Debug, Clone)]

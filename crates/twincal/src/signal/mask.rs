@@ -1,7 +1,7 @@
 //! Takes samples with saturated torque out of the fit, with those whose filter sees them, and says so (case 26).
 
+use super::joints::JointFacts;
 use super::pipeline::Pipeline;
-use super::prepare::JointFacts;
 use super::recording::{Channels, Recording};
 use super::saturation::flat_runs;
 use super::trajectory::Trajectory;

@@ -2,9 +2,15 @@
 
 use super::correct::{Corrections, DerivedFrom};
 use super::history::JointHistory;
-use super::{align, fir, standstill};
+use super::{fir, standstill};
 use serde::{Deserialize, Serialize};
 
+/// Motion filter's highest cut-off as a share of the log's rate.
+pub(crate) const MOTION_LIMIT: f64 = 0.45;
+/// Column filter's highest cut-off as a share of the log's rate: 2.5 f_c is then the rate itself.
+pub(crate) const COLUMN_LIMIT: f64 = 0.4;
+/// Standstill has to last for this many periods of the cut-off.
+const STANDSTILL_PERIODS: f64 = 3.0;
 /// Rates that differ by less than this share are one: clocks are known no better.
 const SAME_RATE: f64 = 1e-6;
 
@@ -50,7 +56,7 @@ impl Pipeline {
     /// has forgotten what was before; infinite without a filter.
     #[must_use]
     pub fn shortest_standstill(&self) -> f64 {
-        align::STANDSTILL_PERIODS / self.cutoff_hz
+        STANDSTILL_PERIODS / self.cutoff_hz
     }
 
     /// The pipeline that changes nothing: every input row is one row.

@@ -1,11 +1,11 @@
 //! A log that is ready for any cut-off: prepared in memory, or prepared again chapter by chapter whenever it is visited.
 
-use super::align::PreparedLog;
-use super::clock::median_step;
+use super::joints::{JointFacts, joint_facts};
 use super::long::{Log, LongLog};
 use super::pipeline::Pipeline;
-use super::prepare::{JointFacts, joint_facts};
+use super::prepared_log::PreparedLog;
 use super::recording::Payload;
+use super::stamps::median_step;
 use crate::error::{Finding, Result};
 use crate::robot::Robot;
 
@@ -86,7 +86,7 @@ impl<'a> ReadyLog<'a> {
     pub fn puts_away(&self) -> bool {
         match self {
             Self::Whole(_) => false,
-            Self::Long(long) => long.log.shelf.is_some(),
+            Self::Long(long) => long.log.shelf().is_some(),
         }
     }
 
@@ -95,7 +95,7 @@ impl<'a> ReadyLog<'a> {
         match self {
             Self::Whole(log) => log.samples(),
             // The next chapter is read while one is visited.
-            Self::Long(long) => 2 * long.log.samples.iter().copied().max().unwrap_or(0),
+            Self::Long(long) => 2 * long.log.samples().iter().copied().max().unwrap_or(0),
         }
     }
 
@@ -121,7 +121,7 @@ impl LongReady {
     /// Rows that a fit with this pipeline keeps at most, about.
     pub(crate) fn rows_at_most(&self, pipeline: &Pipeline) -> usize {
         let step = pipeline.step(self.interval);
-        self.log.samples.iter().map(|n| n.div_ceil(step)).sum()
+        self.log.samples().iter().map(|n| n.div_ceil(step)).sum()
     }
 
     /// Visits the chapters, prepared for a pipeline; see [`LongLog::visit`].
@@ -136,7 +136,7 @@ impl LongReady {
     ) -> Result<()> {
         self.log.visit(findings, |number, chapter, said| {
             let prepared = PreparedLog::new(self.joints.clone(), chapter, pipeline)?;
-            visit(number, &prepared.since(self.log.start), said)
+            visit(number, &prepared.since(self.log.start()), said)
         })
     }
 }

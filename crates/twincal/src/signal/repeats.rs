@@ -4,7 +4,6 @@
 //! (`travel.rs`), for three rows at most, and where the next row makes up for it. Longer runs are an encoder that is stuck or a slow
 //! channel, and are left alone.
 
-use super::clock::Cut;
 use super::recording::{Channels, Recording};
 use super::ticks::{Ticks, ticks};
 use super::travel::{Rows, Travel};
@@ -18,6 +17,18 @@ const MOST: f64 = 0.25;
 const OFF: f64 = 0.5;
 /// Steps beside both of them are at least this share of the usual one.
 const BESIDE: f64 = 0.3;
+
+/// Rows that may go on.
+pub(crate) struct Cut<'a> {
+    /// Ascending indices into the recording.
+    pub(crate) kept: &'a [usize],
+    /// Whether rows were dropped right before each of them.
+    pub(crate) before: &'a [bool],
+    /// Median step, s.
+    pub(crate) interval: f64,
+    /// The pipeline is off.
+    pub(crate) every_row: bool,
+}
 
 /// What stands in place of the rows as logged.
 #[derive(Debug, Clone, PartialEq, Default)]

@@ -1,6 +1,7 @@
 //! What a user says of the pipeline: numbers, or that they are chosen from the data.
 
 use super::correct::Corrections;
+use crate::error::{Error, Result};
 
 /// A number, or "auto": chosen from the data and stated in the result.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,4 +26,41 @@ pub struct SignalSettings {
     pub corrections: Corrections,
     /// Columns may change faster than the motion does (expressions of the user, gear ripple): evaluate them at every sample.
     pub every_sample: bool,
+}
+
+impl SignalSettings {
+    /// Refuses numbers that are out of range.
+    ///
+    /// # Errors
+    /// [`Error::Setting`].
+    pub(crate) fn check(&self) -> Result<()> {
+        let positive = |key: &str, value: f64, zero: bool| {
+            if value.is_finite() && (value > 0.0 || zero && value == 0.0) {
+                return Ok(());
+            }
+            Err(setting(
+                key,
+                format!("{value} is out of range"),
+                "give a number above 0",
+            ))
+        };
+        if let Auto::Value(value) = self.cutoff_hz {
+            positive("signal.cutoff_hz", value, true)?;
+        }
+        if let Auto::Value(value) = self.rate_hz {
+            positive("signal.rate_hz", value, false)?;
+        }
+        self.coulomb_velocity.map_or(Ok(()), |value| {
+            positive("library.coulomb_velocity", value, true)
+        })
+    }
+}
+
+/// The error of a setting that cannot be used.
+pub(super) fn setting(key: &str, problem: String, remedy: &str) -> Error {
+    Error::Setting {
+        key: key.into(),
+        problem,
+        remedy: remedy.into(),
+    }
 }

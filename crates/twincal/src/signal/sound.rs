@@ -1,9 +1,10 @@
 //! Whether a pipeline that was read from a file is one that a choice of filters gives.
 
+use super::fir;
 use super::history::JointHistory;
+use super::joints::joint_facts;
 use super::pipeline::Pipeline;
 use super::thin::coarsest;
-use super::{fir, prepare};
 use crate::robot::Robot;
 use std::fmt::Debug;
 
@@ -18,7 +19,7 @@ impl Pipeline {
     /// The first key whose value no choice of filters gives for this robot, with the value.
     pub(crate) fn unsound(&self, robot: &Robot) -> Option<(&'static str, String)> {
         let joints = robot.dof();
-        let facts = prepare::joint_facts(robot);
+        let facts = joint_facts(robot);
         let corrected = self.corrections.check(&facts, self.is_off()).is_ok();
         let still = &self.standstill_velocity;
         let stands = still.len() == joints && still.iter().all(is_speed);

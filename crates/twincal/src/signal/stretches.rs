@@ -1,7 +1,7 @@
 //! Evenly spread stretches of a log: what is asked of a log's motion but not row by row needs no more.
 
-use super::align::{PreparedLog, Raw};
 use super::pipeline::Pipeline;
+use super::prepared_log::{PreparedLog, Raw};
 use super::ready::{LongReady, ReadyLog};
 use super::thin::factor;
 use super::trajectory::Trajectory;
@@ -110,7 +110,7 @@ impl LongReady {
             let chapter = self.log.chapter((2 * i + 1) * all / (2 * of))?;
             // Chapters that cannot be used are left out, as elsewhere.
             if let Ok(log) = PreparedLog::new(self.joints.clone(), &chapter, pipeline) {
-                let log = log.since(self.log.start);
+                let log = log.since(self.log.start());
                 kept.extend(log.stretches(samples / of, shortest, pipeline));
             }
         }

@@ -1,12 +1,13 @@
 //! What is known of logs before the pipeline is: of those in memory all of it, of the chapters of others what each of them said.
 
 use super::cutoff::{JointSpectra, spectra};
-use super::encoder::quantum;
+use super::joints::JointFacts;
 use super::long::LongLog;
-use super::prepare::{JointFacts, Piece, Prepared, prepare};
+use super::pieces::{Piece, Prepared};
+use super::prepare::prepare;
 use super::recording::{Channels, Recording};
 use super::settings::SignalSettings;
-use super::steps::{changes, common_step};
+use super::steps::{changes, common_step, quantum};
 use crate::error::{Finding, Result};
 use rayon::prelude::*;
 

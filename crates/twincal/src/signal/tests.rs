@@ -1,8 +1,8 @@
 //! The whole pipeline on motion that is known in closed form.
 
-use super::prepare::JointFacts;
+use super::joints::JointFacts;
 use super::*;
-use crate::error::Code;
+use crate::error::{Code, Finding, Result};
 use crate::robot::JointKind;
 use rand::{RngExt, SeedableRng};
 use std::f64::consts::TAU;

@@ -7,10 +7,10 @@
 
 use super::decimate::Decimator;
 use super::fir::thinning_kernel;
-use super::pipeline::Pipeline;
 #[cfg(test)]
-use super::prepare::Values;
-use super::prepare::{Piece, Prepared};
+use super::pieces::Values;
+use super::pieces::{Piece, Prepared};
+use super::pipeline::Pipeline;
 use super::trajectory::Trajectory;
 use rayon::prelude::*;
 use std::borrow::Cow;

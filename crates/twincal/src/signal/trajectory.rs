@@ -6,7 +6,7 @@ use super::recording::Payload;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Segment {
     /// Time stamps, s; uniform to rounding unless the pipeline is off. Those of every d-th sample of a fine clock
-    /// ([`Pipeline::motion_interval`]).
+    /// ([`Pipeline::motion_interval`](super::Pipeline::motion_interval)).
     pub time: Vec<f64>,
     /// Index of each sample's input row in the recording when the clock was uniform already; otherwise empty.
     pub input_rows: Vec<usize>,
@@ -22,7 +22,7 @@ pub struct Segment {
     pub tau: Vec<f64>,
     /// Per joint and sample: the joint stands still or its torque is saturated, so that the torque says nothing.
     pub standstill: Vec<bool>,
-    /// History channels, `channel * len + sample`; empty where none is followed ([`Pipeline::history`]).
+    /// History channels, `channel * len + sample`; empty where none is followed ([`Pipeline::history`](super::Pipeline::history)).
     pub history: Vec<f64>,
     /// Sampling interval, s.
     pub interval: f64,

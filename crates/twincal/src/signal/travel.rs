@@ -3,8 +3,8 @@
 //! A velocity that the controller computed as change of position over a nominal step says nothing of the step itself. The
 //! slope of position over several rows does: there stamps that jitter and rows that repeat average out.
 
-use super::clock::GAP;
 use super::recording::Recording;
+use super::stamps::GAP;
 use rayon::prelude::*;
 use std::ops::Range;
 

@@ -1,6 +1,6 @@
 //! Degrees where radians are meant, as far as motion and joint limits alone can tell (case 18).
 
-use super::prepare::JointFacts;
+use super::joints::JointFacts;
 use super::recording::{Channels, Recording};
 use crate::error::{Error, Result};
 use crate::robot::JointKind;

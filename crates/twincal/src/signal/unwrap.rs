@@ -1,8 +1,8 @@
 //! Angles that a counter folded into one turn, unfolded.
 
-use super::clock::{GAP, median_step};
-use super::long::ReadChapter;
+use super::read_chapter::ReadChapter;
 use super::recording::Recording;
+use super::stamps::{GAP, median_step};
 use crate::error::{Code, Finding, Result, Severity};
 use crate::robot::{JointKind, Robot};
 use rayon::prelude::*;

@@ -3,7 +3,9 @@
 use super::*;
 use crate::robot::JointKind;
 use crate::signal::correct::Corrections;
-use crate::signal::prepare::{JointFacts, Prepared, prepare};
+use crate::signal::joints::JointFacts;
+use crate::signal::pieces::Prepared;
+use crate::signal::prepare::prepare;
 use crate::signal::worlds::{JOINTS, MOTIONS, Motion, World, normal, polled, rows_of};
 use rand::{RngExt, SeedableRng};
 

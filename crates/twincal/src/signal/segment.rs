@@ -1,13 +1,13 @@
 //! One piece of a log as a segment: as logged, or with smooth motion.
 
-use super::{PreparedLog, Raw};
-use crate::signal::convolve::{correlate, correlate_two};
-use crate::signal::correct::DerivedFrom;
-use crate::signal::fir::{MotionKernels, motion_half_samples};
-use crate::signal::pipeline::Pipeline;
-use crate::signal::prepare::{Piece, Values, pick};
-use crate::signal::standstill::{at_rest, slower_than};
-use crate::signal::trajectory::{LoggedSamples, Segment};
+use super::convolve::{correlate, correlate_two};
+use super::correct::DerivedFrom;
+use super::fir::{MotionKernels, motion_half_samples};
+use super::pieces::{Piece, Values, pick};
+use super::pipeline::Pipeline;
+use super::prepared_log::{PreparedLog, Raw};
+use super::standstill::{at_rest, slower_than};
+use super::trajectory::{LoggedSamples, Segment};
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::ops::Range;

@@ -1,20 +1,23 @@
 //! The pipeline with the filter on: cut-offs, sources of derivatives and thresholds from the spectra of the training logs.
 
-use super::{COLUMN_LIMIT, COULOMB_VELOCITY, FEWEST_ROWS, MOTION_LIMIT, setting, unexcited};
-use crate::error::{Code, Error, Finding, Result, Severity};
-use crate::signal::correct::DerivedFrom;
-use crate::signal::cutoff::{
+use super::correct::DerivedFrom;
+use super::cutoff::{
     JointSpectra, automatic, derived_from, motion_band, noisy_velocity, rms_acceleration, wider,
 };
-use crate::signal::encoder::{Encoder, velocity_resolution};
-use crate::signal::fir::{column_half_seconds, column_kernel, motion_half_seconds, noise_gain};
-use crate::signal::pipeline::Pipeline;
-use crate::signal::prepare::JointFacts;
-use crate::signal::settings::{Auto, SignalSettings};
-use crate::signal::survey::{Candidates, Survey};
-use crate::signal::thin::{coarsest, factor};
+use super::encoder::{Encoder, velocity_resolution};
+use super::fir::{column_half_seconds, column_kernel, motion_half_seconds, noise_gain};
+use super::joints::JointFacts;
+use super::pipeline::{COLUMN_LIMIT, MOTION_LIMIT, Pipeline};
+use super::settings::{Auto, SignalSettings, setting};
+use super::survey::{Candidates, Survey};
+use super::thin::{coarsest, factor};
+use super::unexcited::{COULOMB_VELOCITY, unexcited};
+use crate::error::{Code, Error, Finding, Result, Severity};
 use crate::words::significant;
 use rayon::prelude::*;
+
+/// Kept rows that the longest segment must give at least.
+const FEWEST_ROWS: f64 = 10.0;
 
 /// Clocks of the training logs.
 struct Clocks {
@@ -92,7 +95,7 @@ impl Spectra {
     }
 }
 
-/// Pipeline on; and a wider cut-off, see [`super::Chosen::wider_hz`].
+/// Pipeline on; and a wider cut-off, see [`super::choose::Chosen::wider_hz`].
 pub(super) fn on(
     joints: &[JointFacts],
     first_log: &str,
