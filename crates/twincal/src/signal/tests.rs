@@ -1,9 +1,9 @@
 //! The whole pipeline on motion that is known in closed form.
 
-use super::joints::JointFacts;
 use super::*;
 use crate::error::{Code, Finding, Result};
 use crate::robot::JointKind;
+use crate::signal::log::joints::JointFacts;
 use rand::{RngExt, SeedableRng};
 use std::f64::consts::TAU;
 
@@ -97,7 +97,7 @@ fn pipeline(log: &Recording) -> Pipeline {
 
 fn chosen(log: &Recording, settings: &SignalSettings) -> Result<(Pipeline, Vec<Finding>)> {
     let logs = Logs::from(std::slice::from_ref(log));
-    let chosen = choose::choose(&joints(), &logs.0, settings)?;
+    let chosen = auto::choose::choose(&joints(), &logs.0, settings)?;
     let (pipeline, findings) = (chosen.pipeline, chosen.findings);
     Ok((pipeline, findings))
 }
