@@ -10,22 +10,22 @@
 //! (`h_CᵀA_CC⁻¹h_C` is rounding, squared.) A walk over models needs O alone, and mean and variance of C follow from those
 //! of O exactly, model by model or from the averages.
 
-use super::{Block, Standard, halves_in, nudged};
-use crate::infer::answer::Averages;
-use crate::infer::certain::Certain;
+use super::answer::Averages;
+use super::certainty::Certain;
+use super::standard::{Block, Standard, halves_in, nudged};
 use crate::linear_algebra::Cholesky;
 
 /// See the module's text. Sets of components are by place in `open.blocks`.
 #[derive(Debug)]
-pub(in crate::infer) struct Reduced<'a> {
+pub(super) struct Reduced<'a> {
     /// All columns.
-    pub(in crate::infer) full: &'a Standard,
+    pub(super) full: &'a Standard,
     /// The columns that are left, scaled to a unit diagonal again.
-    pub(in crate::infer) open: Standard,
+    pub(super) open: Standard,
     /// Components of `open` that are in for certain all the same: their bounds may act.
-    pub(in crate::infer) certain: Vec<usize>,
+    pub(super) certain: Vec<usize>,
     /// Components of `open` that may be in or out.
-    pub(in crate::infer) active: Vec<usize>,
+    pub(super) active: Vec<usize>,
     /// Place in `full.blocks` of each component of `open`, and of those integrated out.
     places: Vec<usize>,
     gone_places: Vec<usize>,
@@ -44,23 +44,23 @@ pub(in crate::infer) struct Reduced<'a> {
 
 /// Moments of the columns integrated out in one model: E[δ] and Var/φ.
 #[derive(Debug, Default, Clone)]
-pub(in crate::infer) struct Response {
-    pub(in crate::infer) delta: Vec<f64>,
-    pub(in crate::infer) variance: Vec<f64>,
+pub(super) struct Response {
+    pub(super) delta: Vec<f64>,
+    pub(super) variance: Vec<f64>,
     /// `Σ_b C_ab T_b` of one member a.
     row: Vec<f64>,
 }
 
 impl<'a> Reduced<'a> {
     /// Without the components that are certain and whose bounds never act.
-    pub(in crate::infer) fn new(full: &'a Standard, certain: &Certain) -> Self {
+    pub(super) fn new(full: &'a Standard, certain: &Certain) -> Self {
         let goes =
             |block: &Block| certain.sure[block.component] && certain.settled[block.component];
         Self::without(full, certain, goes).unwrap_or_else(|| Self::whole(full, certain))
     }
 
     /// With every column in the tableau.
-    pub(in crate::infer) fn whole(full: &'a Standard, certain: &Certain) -> Self {
+    pub(super) fn whole(full: &'a Standard, certain: &Certain) -> Self {
         let (sure, active) =
             (0..full.blocks.len()).partition(|&b| certain.sure[full.blocks[b].component]);
         Self {
@@ -129,12 +129,12 @@ impl<'a> Reduced<'a> {
     }
 
     /// Whether columns were integrated out.
-    pub(in crate::infer) fn shrinks(&self) -> bool {
+    pub(super) fn shrinks(&self) -> bool {
         !self.gone.is_empty()
     }
 
     /// (columns ascending, positions in `full`) of a model, `set` by place in `open.blocks`.
-    pub(in crate::infer) fn members(&self, set: &[u64]) -> (Vec<u32>, Vec<usize>) {
+    pub(super) fn members(&self, set: &[u64]) -> (Vec<u32>, Vec<usize>) {
         let mut whole = vec![0u64; self.full.blocks.len().div_ceil(64)];
         let inside = (0..self.places.len()).filter(|b| set[b / 64] >> (b % 64) & 1 == 1);
         for place in inside
@@ -147,7 +147,7 @@ impl<'a> Reduced<'a> {
     }
 
     /// Values by component of `open` in the order of `full.blocks`, `gone` for the others.
-    pub(in crate::infer) fn by_block(&self, values: &[f64], gone: f64) -> Vec<f64> {
+    pub(super) fn by_block(&self, values: &[f64], gone: f64) -> Vec<f64> {
         let mut out = vec![gone; self.full.blocks.len()];
         for (&place, value) in self.places.iter().zip(values) {
             out[place] = *value;
@@ -156,23 +156,23 @@ impl<'a> Reduced<'a> {
     }
 
     /// First position in `full` of a component of `open`.
-    pub(in crate::infer) fn first_position(&self, block: usize) -> usize {
+    pub(super) fn first_position(&self, block: usize) -> usize {
         self.full.blocks[self.places[block]].start
     }
 
     /// Position in `full` and units per its unit of every position of `open`.
-    pub(in crate::infer) fn left(&self) -> impl Iterator<Item = (usize, f64)> {
+    pub(super) fn left(&self) -> impl Iterator<Item = (usize, f64)> {
         self.left.iter().copied().zip(self.stretch.iter().copied())
     }
 
     /// Positions in `full` of the columns integrated out.
-    pub(in crate::infer) fn gone(&self) -> &[usize] {
+    pub(super) fn gone(&self) -> &[usize] {
         &self.gone
     }
 
     /// Moments of the columns integrated out, from δ of `open` and the rows of (A'_zz)⁻¹ of its members.
     #[inline(always)]
-    pub(in crate::infer) fn respond<'r>(
+    pub(super) fn respond<'r>(
         &self,
         delta: &[f64],
         members: &[usize],
@@ -211,7 +211,7 @@ impl<'a> Reduced<'a> {
     }
 
     /// Averages over models of all columns from those of `open`; `products` is E[δ δᵀ], needed where columns are gone.
-    pub(in crate::infer) fn widen(&self, open: Averages, products: &[f64]) -> Averages {
+    pub(super) fn widen(&self, open: Averages, products: &[f64]) -> Averages {
         let (size, count, out) = (self.full.size(), self.left.len(), self.gone.len());
         let mut wide = Averages {
             inclusion: vec![1.0; size],
