@@ -24,16 +24,7 @@ const FORBIDDEN: [&str; 14] = [
 ];
 
 /// Modules with two files that use each other: none may join them.
-const CIRCLES: [&str; 8] = [
-    "robot",
-    "rigid_fit",
-    "incidents",
-    "term",
-    "gram",
-    "statistics",
-    "fleet",
-    "design",
-];
+const CIRCLES: [&str; 6] = ["robot", "term", "gram", "statistics", "fleet", "design"];
 
 /// One source file with comments and literals blanked out.
 struct Source {
@@ -101,7 +92,7 @@ fn no_files_of_a_module_use_each_other_in_a_circle() {
     for with_wings in ["calibrate", "signal"] {
         assert_eq!(circle(&folders(&arrows_of(with_wings))), None);
     }
-    for whole in ["assess", "calibrate", "signal"] {
+    for whole in ["assess", "calibrate", "incidents", "rigid_fit", "signal"] {
         assert_eq!(circle(&arrows_of(whole)), None);
     }
     let with_circles: Vec<&str> = (order.iter().map(String::as_str))
