@@ -336,11 +336,11 @@ fn what_no_program_of_ours_wrote_is_refused() {
     };
     refused(
         with(&|own| own.metadata.format = 1),
-        "has format 1, this program reads 3; make it anew",
+        "has format 1, this program reads 4; make it anew",
     );
     refused(
-        with(&|own| own.metadata.format = 4),
-        "has format 4, this program reads 3; read it with a newer",
+        with(&|own| own.metadata.format = 5),
+        "has format 5, this program reads 4; read it with a newer",
     );
     refused(
         with(&|own| own.metadata.logs.clear()),
@@ -384,6 +384,10 @@ fn what_no_program_of_ours_wrote_is_refused() {
     let mut crafted = Crafted::new().with_text(&other);
     crafted.metadata.logs[0].sums = 7;
     refused(crafted, "holds other sums than its header says");
+    let other = text.replace("\"torque_rms\":[", "\"torque_rms\":[1.0,");
+    assert_ne!(other, text);
+    let crafted = Crafted::new().with_text(&other);
+    refused(crafted, "has another number of joints");
     let one_column = |own: &mut Crafted| own.batches[0] = own.batches[0].project(&[0]).unwrap();
     refused(
         with(&one_column),

@@ -35,7 +35,7 @@ use crate::plug_in::Fit;
 use crate::posterior::Posterior;
 use crate::robot::Robot;
 use crate::self_check::self_check;
-use crate::signal::{Log, Logs, ReadyLog, less_driven, ready};
+use crate::signal::{Log, Logs, ReadyLog, less_driven, ready, torque_rms};
 use crate::statistics::{Purpose, Sums, residual_form};
 use crate::term::Library;
 use crate::twin::Twin;
@@ -347,8 +347,11 @@ fn compared(statistics: &Statistics, (heldout, data): (&Logs<'_>, &Data)) -> Res
     let named = heldout.0.iter().map(Log::name).zip(&noise);
     let known = fitted().map(|log| (log.name(), &log.noise));
     let mut findings = sketched_copies(&known.chain(named).collect::<Vec<_>>());
-    let sizes = fitted().map(|log| (log.name().to_owned(), log.torque_rms()));
-    findings.extend(less_driven(robot, &sizes.collect::<Vec<_>>()));
+    let sizes = fitted().map(|log| Ok((log.name().to_owned(), log.about.torque_rms.clone())));
+    let tested = heldout.0.iter();
+    let tested = tested.map(|log| Ok((log.name().to_owned(), torque_rms(log)?)));
+    let sizes: Vec<_> = sizes.chain(tested).collect::<Result<_>>()?;
+    findings.extend(less_driven(robot, &sizes));
     Ok(findings)
 }
 

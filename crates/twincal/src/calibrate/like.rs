@@ -34,7 +34,7 @@ impl<'a> Sizes<'a> {
             let moving: f64 = joint.blocks.iter().map(|own| own.gram.n).sum();
             moving > MOVES * rows
         });
-        let rms = log.torque_rms().into_iter();
+        let rms = log.row_torque_rms().into_iter();
         Self {
             log: log.name(),
             rms: rms.map(|rms| rms.filter(|rms| *rms > 0.0)).collect(),

@@ -13,7 +13,7 @@ use crate::observations::Observations;
 use crate::robot::Robot;
 use crate::rows::{RowBlock, RowSignal, visit_parts};
 use crate::self_check::{Look, look};
-use crate::signal::{self, Payload, Trajectory, constant_torque, ready};
+use crate::signal::{self, Payload, Trajectory, constant_torque, ready, torque_rms};
 use crate::statistics::{BLOCKS, LogSums};
 use crate::term::Library;
 use crate::words::{quoted, significant};
@@ -74,6 +74,8 @@ pub(crate) struct About {
     pub(crate) reading: String,
     /// What was found while it was read.
     pub(crate) findings: Vec<Finding>,
+    /// Root mean square of each joint's torque as logged, N·m or N.
+    pub(crate) torque_rms: Vec<Option<f64>>,
 }
 
 impl Statistics {
@@ -132,6 +134,7 @@ impl Statistics {
                     source: source.to_owned(),
                     reading: String::new(),
                     findings,
+                    torque_rms: torque_rms(given)?,
                 },
             }],
         })
@@ -326,8 +329,8 @@ impl LogStatistics {
         }
     }
 
-    /// Root mean square of each joint's torque, N·m or N.
-    pub(crate) fn torque_rms(&self) -> Vec<Option<f64>> {
+    /// Root mean square of each joint's torque in the rows, N·m or N.
+    pub(crate) fn row_torque_rms(&self) -> Vec<Option<f64>> {
         let rows = self.sums.rows.iter().sum::<usize>().max(1) as f64;
         let squares = self.sums.joints.iter().map(|joint| {
             let squares = joint.blocks.iter().map(|own| own.torque);

@@ -418,6 +418,7 @@ impl Taken<'_> {
         let fits = own.rows.len() == BLOCKS
             && own.longest.len() == joints
             && facts.hull.len() == joints
+            && own.about.torque_rms.len() == joints
             && facts.summary.rows.len() == joints;
         if !fits {
             return Err(

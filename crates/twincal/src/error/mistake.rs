@@ -22,7 +22,7 @@ pub enum Mistake {
 
 /// Every code that forbids a "Yes": from which severity on, and what it is about. Add a line for a new one; nothing else decides.
 const TABLE: &[(Code, Severity, Mistake)] = &[
-    // signal/agreement.rs, self_check
+    // signal/filter/agreement.rs, self_check
     (Code::SignFlip, Note, Mistake::Contradiction),
     (Code::JointOrder, Note, Mistake::Contradiction),
     (Code::TorqueScale, Note, Mistake::Contradiction),
@@ -36,7 +36,7 @@ const TABLE: &[(Code, Severity, Mistake)] = &[
     (Code::TorqueHeld, Degraded, Mistake::NoMeasurement),
     // calibrate/result/common_gain.rs; a warning where torque comes from currents
     (Code::CommonFactor, Degraded, Mistake::Contradiction),
-    // signal/torque.rs; a warning where one joint of several is passive
+    // signal/clean/torque.rs; a warning where one joint of several is passive
     (Code::ConstantTorque, Degraded, Mistake::NoMeasurement),
     // cross_check
     (Code::CopiedLog, Warning, Mistake::Copy),
@@ -45,7 +45,7 @@ const TABLE: &[(Code, Severity, Mistake)] = &[
     (Code::LogTorqueLag, Warning, Mistake::OddTorque),
     (Code::ClockDrift, Warning, Mistake::OddMotion),
     (Code::EncoderStuck, Warning, Mistake::OddMotion),
-    // signal/jumps.rs
+    // signal/clean/jumps.rs
     (Code::PositionStep, Warning, Mistake::OddMotion),
     // calibrate/checks/another_state.rs
     (Code::AnotherState, Warning, Mistake::AnotherState),

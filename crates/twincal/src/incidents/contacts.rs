@@ -5,9 +5,8 @@
 //! velocity reversal and at rest, where friction is anything between plus and minus its static value, several times that. What
 //! comes again where the robot is in the same state is the model's error, what the motion's own spike explains is a position glitch.
 
+use super::incident::{Incident, IncidentKind};
 use super::repeats::{Peak, repeats};
-use super::{Incident, IncidentKind};
-use crate::linear_algebra::dot;
 use crate::rigid_fit::{Bins, Design, Settled, Zone, mad, settle};
 use crate::robot::Robot;
 use std::ops::Range;
@@ -305,9 +304,4 @@ fn put(torque: &mut [Vec<Vec<f64>>], bins: &[Bins], residual: &[Vec<f64>]) {
             from += own.len();
         }
     }
-}
-
-/// Mean square of some numbers.
-pub(super) fn mean_square(values: &[f64]) -> f64 {
-    dot(values, values) / values.len().max(1) as f64
 }

@@ -3,8 +3,11 @@
 //! Such stretches are told, listed and left out of the fit; the robot is not calibrated on a collision, nor on brakes.
 
 mod contacts;
+mod incident;
 mod repeats;
 mod stops;
+
+pub use incident::{Incident, IncidentKind};
 
 use crate::error::Code;
 use crate::error::{Finding, Result, Severity};
@@ -12,37 +15,10 @@ use crate::rigid_fit::{Bins, bins};
 use crate::robot::Robot;
 use crate::signal::{FewChapters, Log, Pipeline, Raw, Shelf, Trajectory, align, prepare};
 use crate::words::significant;
-use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// Incidents that a message lists.
 const LISTED: usize = 5;
-
-/// What happened.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum IncidentKind {
-    /// Torque that neither rigid bodies nor friction explain, for a short time: a contact, a collision or a push.
-    #[serde(alias = "spike")]
-    Contact,
-    /// All joints stand still without the torque that holds them: brakes, or a protective stop.
-    DrivesOff,
-}
-
-/// A stretch of a log that is not the robot's own motion.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Incident {
-    /// What happened.
-    pub kind: IncidentKind,
-    /// Joint in which it is largest.
-    pub joint: String,
-    /// First and last stamp, s.
-    pub span: [f64; 2],
-    /// Contact: largest torque that is not explained. Drives off: largest torque that holding would take. N·m or N.
-    pub torque: f64,
-    /// Samples from first to last.
-    pub samples: u64,
-}
 
 /// What a log shows of incidents, part by part: what is far beyond the usual is told by all of them together.
 #[derive(Debug, Default)]

@@ -1,6 +1,6 @@
 //! Whether what is left of a torque comes again when the robot is in the same state: then it is the model's error, not a contact.
 
-use super::contacts::mean_square;
+use crate::linear_algebra::dot;
 use crate::rigid_fit::Bins;
 use std::ops::Range;
 
@@ -153,4 +153,9 @@ fn note(passes: &mut Vec<Pass>, pass: Pass) {
         }
         _ => passes.push(pass),
     }
+}
+
+/// Mean square of some numbers.
+fn mean_square(values: &[f64]) -> f64 {
+    dot(values, values) / values.len().max(1) as f64
 }

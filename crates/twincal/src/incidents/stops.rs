@@ -1,6 +1,6 @@
 //! All joints at rest, and no torque where the model says that holding takes some.
 
-use super::{Incident, IncidentKind};
+use super::incident::{Incident, IncidentKind};
 use crate::robot::{Motion, Robot, nominal_torque};
 use crate::signal::{Pipeline, Trajectory};
 

@@ -2,11 +2,11 @@
 //!
 //! What is reported at the end comes from [`super::infer`].
 
-use super::EXACT_LIMIT;
 use super::answer::{Averages, Listed, posterior};
-use super::search::{self, Care, Found, Start};
-use super::standard::{Reduced, Standard};
-use super::{bounds, certain};
+use super::reduced::Reduced;
+use super::search::{self, Care, Found, models_of, shares};
+use super::standard::Standard;
+use super::{EXACT_LIMIT, bounds, certain};
 use crate::error::Result;
 use crate::posterior::{Method, Model, Posterior, Problem};
 use std::collections::BTreeMap;
@@ -31,7 +31,7 @@ pub(super) fn approximate(problem: &Problem, warm: Option<&Posterior>) -> Result
     };
     let certain = certain::components(&standard, problem, warm);
     let reduced = Reduced::new(&standard, &certain);
-    let found = search(&reduced, problem, models_of(warm, &standard), budget, care);
+    let found = search::from_models(&reduced, problem, models_of(warm, &standard), budget, care);
     let total = found.sums.total() / (1.0 - found.missing);
     let heaviest = shares(&reduced, &found, total, LISTED_MODELS);
     let all = total.ln() + found.sums.reference;
@@ -64,61 +64,6 @@ pub(super) fn approximate(problem: &Problem, warm: Option<&Posterior>) -> Result
         Some(log_evidence + log_growth),
         method,
     ))
-}
-
-/// Runs the search on a problem from the first two of the given models; without any, from the empty one and, of up to [`MANY_COLUMNS`](super::MANY_COLUMNS), the full one.
-pub(super) fn search(
-    reduced: &Reduced<'_>,
-    problem: &Problem,
-    warm: &[Model],
-    budget: usize,
-    care: Care,
-) -> Found {
-    let standard = &reduced.open;
-    let start = |model: &Model| -> Vec<usize> {
-        let mut holds = vec![false; problem.prior.components()];
-        let members = model.members.iter();
-        members.for_each(|&k| holds[standard.component[k as usize]] = true);
-        let active = reduced.active.iter().copied();
-        active
-            .filter(|&b| holds[standard.blocks[b].component])
-            .collect()
-    };
-    let mut starts: Vec<Vec<usize>> = warm.iter().take(2).map(start).collect();
-    starts.dedup();
-    search::run(
-        reduced,
-        &problem.prior,
-        &Start {
-            warm: &starts,
-            budget,
-            care,
-        },
-    )
-}
-
-/// Models of a posterior of the same components.
-pub(super) fn models_of<'a>(warm: Option<&'a Posterior>, standard: &Standard) -> &'a [Model] {
-    warm.filter(|warm| warm.component == standard.component)
-        .map_or(&[], |warm| &warm.models)
-}
-
-/// (share of `total`, columns, positions) of the heaviest models found.
-pub(super) fn shares(
-    reduced: &Reduced<'_>,
-    found: &Found,
-    total: f64,
-    most: usize,
-) -> Vec<(f64, Vec<u32>, Vec<usize>)> {
-    found
-        .models
-        .iter()
-        .take(most)
-        .map(|(log_weight, set)| {
-            let (members, positions) = reduced.members(set);
-            (found.sums.weight(*log_weight) / total, members, positions)
-        })
-        .collect()
 }
 
 /// Averages over all models found.

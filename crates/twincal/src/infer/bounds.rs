@@ -12,35 +12,27 @@
 //!
 //! Listed models are treated one by one; the others, light by construction, are scaled as the listed ones are on
 //! average. Where that moves weight to models that a sum without bounds does not list, a search that knows the bounds
-//! lists them. Chains know the bounds themselves (`gibbs/chain/admission.rs`): of their models only the moments change.
+//! lists them (`joined.rs`). Chains know the bounds themselves (`gibbs/chain/admission.rs`): of their models only the moments change.
 
 mod acting;
 mod propagation;
 
 use super::answer::{Averages, Listed};
-use super::approximate;
 use super::moments::{FORBIDDEN, log_normal_mass};
-use super::search::Care;
-use super::standard::{Reduced, Standard, nudged};
+use super::reduced::Reduced;
+use super::standard::{Standard, nudged};
 use super::tableau::Tableau;
 use crate::error::Result;
 use crate::linear_algebra::Cholesky;
 use crate::posterior::{Model, Problem};
-use acting::{Acting, Bound};
+use acting::{Acting, Bound, FAR};
 pub(super) use acting::{SlabMasses, most_of_sums};
 use propagation::propagate;
 use rayon::prelude::*;
-use std::collections::BTreeSet;
 
 /// Probability of what is not listed below which its moments are not told from the sampler's error.
 const FEW: f64 = 0.01;
-/// A bound this many standard deviations below the mean does not act: its mass is 1 − 6e-16.
-const FAR: f64 = 8.0;
 
-/// Models that the search beside another method expands.
-const BUDGET: usize = 1024;
-/// How many of its models join the list.
-const JOINED: usize = 300;
 /// A model lighter than this share without bounds was not listed for its weight.
 const JOINED_SHARE: f64 = 1e-12;
 
@@ -222,49 +214,6 @@ fn heaviest_first(listed: &Listed, total: f64) -> Listed {
             .collect(),
         positions: order.iter().map(|&i| listed.positions[i].clone()).collect(),
     }
-}
-
-/// [`apply`] for a method that does not know the bounds: where they act, its list is joined by what a search finds.
-pub(super) fn settle(
-    problem: &Problem,
-    reduced: &Reduced<'_>,
-    averages: &mut Averages,
-    mut listed: Listed,
-) -> Result<(Listed, f64)> {
-    let standard = reduced.full;
-    if !standard.bounded {
-        return Ok((listed, 0.0));
-    }
-    let found = approximate::search(reduced, problem, &[], BUDGET, Care::Full);
-    let known: BTreeSet<Vec<u32>> = listed
-        .models
-        .iter()
-        .map(|model| model.members.clone())
-        .collect();
-    // Free weights of models that are not listed, relative to the heaviest listed one.
-    let Some(heaviest) = listed.models.first() else {
-        return Ok((listed, 0.0));
-    };
-    let reference = log_weight(problem, standard, heaviest) - heaviest.weight.ln();
-    let mut log_weights: Vec<f64> = listed.models.iter().map(|m| m.weight.ln()).collect();
-    let shares = approximate::shares(reduced, &found, found.sums.total(), JOINED);
-    let joined: Vec<(Vec<usize>, Model, f64)> = shares
-        .into_par_iter()
-        .filter(|(_, members, _)| !known.contains(members))
-        .map(|(_, _, mut positions)| {
-            positions.sort_unstable_by_key(|&d| standard.order[d]);
-            let mut model = standard.model(&positions, 1.0)?;
-            let log_weight = log_weight(problem, standard, &model) - reference;
-            model.weight = log_weight.exp();
-            Ok((positions, model, log_weight))
-        })
-        .collect::<Result<_>>()?;
-    for (positions, model, log_weight) in joined {
-        log_weights.push(log_weight);
-        listed.models.push(model);
-        listed.positions.push(positions);
-    }
-    apply(standard, averages, listed, log_weights, Weights::Free)
 }
 
 /// ln of a model's weight but for what all models share, from its own factor.

@@ -3,9 +3,9 @@
 //! A payload and the last link's mass moments together with its tensor say almost the same. Going from one story to the
 //! other by flips alone passes through models that nobody believes.
 
-use super::kin::Kin;
+use super::kin::{Kin, Step};
 use super::standard::Standard;
-use super::walker::{Step, Walker};
+use super::walker::Walker;
 use crate::linear_algebra::Cholesky;
 use crate::prior::Prior;
 

@@ -2,8 +2,14 @@
 
 use super::standard::Standard;
 use super::tableau::Tableau;
-use super::walker::Step;
 use crate::prior::Prior;
+
+/// A step: components that leave and enter.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) struct Step {
+    pub(super) leaving: Vec<usize>,
+    pub(super) entering: Vec<usize>,
+}
 
 /// Parents and children by place in `standard.blocks`; a parent that was integrated out is in and binds nobody.
 pub(super) struct Kin {

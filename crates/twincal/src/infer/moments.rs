@@ -1,9 +1,10 @@
 //! Moments of one model's coefficients, read off the tableau, for the present model and for its neighbours; and their
 //! weighted sums.
 
+use super::kin::Step;
 use super::pivot::Pivot;
 use super::standard::Standard;
-use super::walker::{Step, Walker};
+use super::walker::Walker;
 use crate::linear_algebra::Cholesky;
 use crate::prior::HalfSpace;
 use statrs::function::erf::erfc;

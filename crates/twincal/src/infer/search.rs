@@ -9,8 +9,10 @@ use super::MANY_COLUMNS;
 use super::bounds::{Weights, truncate};
 use super::exchanges::{Exchange, exchanges};
 use super::moments::{Moments, Sums, after_exchange, after_flip, present};
-use super::standard::Reduced;
+use super::reduced::Reduced;
+use super::standard::Standard;
 use super::walker::Walker;
+use crate::posterior::{Model, Posterior, Problem};
 use crate::prior::Prior;
 use pulp::{Simd, WithSimd};
 use std::cmp::Ordering;
@@ -88,7 +90,7 @@ impl Care {
 }
 
 /// Runs a search.
-pub(super) fn run(reduced: &Reduced<'_>, prior: &Prior, start: &Start<'_>) -> Found {
+fn run(reduced: &Reduced<'_>, prior: &Prior, start: &Start<'_>) -> Found {
     pulp::Arch::new().dispatch(Run {
         reduced,
         prior,
@@ -134,6 +136,61 @@ impl WithSimd for Run<'_> {
         search.begin(simd, start.warm);
         search.expand(simd, start.budget)
     }
+}
+
+/// Runs the search on a problem from the first two of the given models; without any, from the empty one and, of up to [`MANY_COLUMNS`], the full one.
+pub(super) fn from_models(
+    reduced: &Reduced<'_>,
+    problem: &Problem,
+    warm: &[Model],
+    budget: usize,
+    care: Care,
+) -> Found {
+    let standard = &reduced.open;
+    let start = |model: &Model| -> Vec<usize> {
+        let mut holds = vec![false; problem.prior.components()];
+        let members = model.members.iter();
+        members.for_each(|&k| holds[standard.component[k as usize]] = true);
+        let active = reduced.active.iter().copied();
+        active
+            .filter(|&b| holds[standard.blocks[b].component])
+            .collect()
+    };
+    let mut starts: Vec<Vec<usize>> = warm.iter().take(2).map(start).collect();
+    starts.dedup();
+    run(
+        reduced,
+        &problem.prior,
+        &Start {
+            warm: &starts,
+            budget,
+            care,
+        },
+    )
+}
+
+/// Models of a posterior of the same components.
+pub(super) fn models_of<'a>(warm: Option<&'a Posterior>, standard: &Standard) -> &'a [Model] {
+    warm.filter(|warm| warm.component == standard.component)
+        .map_or(&[], |warm| &warm.models)
+}
+
+/// (share of `total`, columns, positions) of the heaviest models found.
+pub(super) fn shares(
+    reduced: &Reduced<'_>,
+    found: &Found,
+    total: f64,
+    most: usize,
+) -> Vec<(f64, Vec<u32>, Vec<usize>)> {
+    found
+        .models
+        .iter()
+        .take(most)
+        .map(|(log_weight, set)| {
+            let (members, positions) = reduced.members(set);
+            (found.sums.weight(*log_weight) / total, members, positions)
+        })
+        .collect()
 }
 
 /// Steepest ascent by flips of `active` components, then by exchanges, until neither helps.

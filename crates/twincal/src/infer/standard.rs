@@ -9,10 +9,6 @@
 //!
 //! so that neither `yy − rᵀA⁻¹r` nor `E[β²] − E[β]²` is ever a difference of large numbers.
 
-mod reduced;
-
-pub(super) use reduced::{Reduced, Response};
-
 use super::check::check;
 use crate::error::{Error, Result};
 use crate::linear_algebra::{Cholesky, NotPositiveDefinite};
@@ -49,19 +45,19 @@ pub(super) struct Standard {
     /// Column of each position.
     pub(super) order: Vec<usize>,
     /// Its name.
-    names: Vec<String>,
+    pub(super) names: Vec<String>,
     /// Component of each column.
     pub(super) component: Vec<usize>,
     /// Components in the order of their positions.
     pub(super) blocks: Vec<Block>,
-    /// Components of each family that are in every model without a position here, see [`Reduced`].
+    /// Components of each family that are in every model without a position here, see [`super::reduced::Reduced`].
     pub(super) held: Vec<usize>,
     /// Their `Σ ln factor − ½ ln |A| Π v`.
     pub(super) log_held: f64,
     /// `√(G_kk + 1/v_k)` of each position: `β = β_natural · unit / scale`.
-    scale: Vec<f64>,
+    pub(super) scale: Vec<f64>,
     /// `√(2 b̂)`, N·m.
-    unit: f64,
+    pub(super) unit: f64,
     /// `A`, unit diagonal, K × K.
     pub(super) matrix: Vec<f64>,
     /// `β̂`.
@@ -79,9 +75,9 @@ pub(super) struct Standard {
     /// `a_n = a0 + n/2`.
     pub(super) shape: f64,
     /// `b̂ = b0 + RSS/2` of the full model, (N·m)².
-    full_scale: f64,
+    pub(super) full_scale: f64,
     /// All of ln p(y, z) that does not depend on z, the power of b̂ included.
-    log_constant: f64,
+    pub(super) log_constant: f64,
 }
 
 impl Standard {
@@ -411,7 +407,11 @@ fn blocks_of(prior: &Prior, components: &[usize], mass: impl Fn(usize) -> f64) -
 
 /// Bounds on sums with columns by position in `order`, and factors times `unit` there; those with a column that has no position are
 /// left out.
-fn halves_in(halves: &[HalfSpace], order: &[usize], unit: impl Fn(usize) -> f64) -> Vec<HalfSpace> {
+pub(super) fn halves_in(
+    halves: &[HalfSpace],
+    order: &[usize],
+    unit: impl Fn(usize) -> f64,
+) -> Vec<HalfSpace> {
     let place = |k: usize| order.iter().position(|&own| own == k);
     let set = |own: &Vec<usize>| own.iter().map(|&k| place(k)).collect::<Option<Vec<_>>>();
     let moved = |half: &HalfSpace| {

@@ -11,7 +11,7 @@
 //! A component B of the model has `block = (A_zz⁻¹)_BB`, one that is out the Schur complement `A_BB − A_Bz A_zz⁻¹ A_zB`.
 //! Flipping it adds `± gradientᵀ block⁻¹ gradient` to c (see [`Standard`]) and its determinant decides what that costs.
 
-use crate::infer::standard::Standard;
+use super::standard::Standard;
 use crate::lanes::LANES;
 use pulp::Simd;
 

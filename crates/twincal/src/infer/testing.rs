@@ -1,6 +1,6 @@
 //! Random regression problems for the tests of this module.
 
-use crate::infer::{Choice, InferenceSettings, infer};
+use super::{Choice, InferenceSettings, infer};
 use crate::linear_algebra::Cholesky;
 use crate::posterior::{Posterior, Problem};
 use crate::prior::{Inclusion, Prior};

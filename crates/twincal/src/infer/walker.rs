@@ -4,9 +4,9 @@
 //! ln weight(z) = ln p(z) + Σ ln factor − ½ ln |A_zz| Π v − a_n ln(1 + c_z)
 //! ```
 //!
-//! What [`super::standard::Reduced`] took out of the tableau counts in every term.
+//! What [`super::reduced::Reduced`] took out of the tableau counts in every term.
 
-use super::kin::Kin;
+use super::kin::{Kin, Step};
 use super::pivot::Pivot;
 use super::standard::Standard;
 use super::tableau::Tableau;
@@ -43,13 +43,6 @@ fn odds(prior: &Prior) -> Vec<Vec<[f64; 2]>> {
         .enumerate()
         .map(|(family, &size)| (0..size).map(|others| one_more(family, others)).collect())
         .collect()
-}
-
-/// A step: components that leave and enter.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub(super) struct Step {
-    pub(super) leaving: Vec<usize>,
-    pub(super) entering: Vec<usize>,
 }
 
 impl<'a> Walker<'a> {

@@ -20,6 +20,8 @@ const REST: f64 = 0.02;
 const MEMORY: usize = 2;
 /// Channels of a joint: torque, position, velocity, acceleration and the shapes of dry friction.
 const CHANNELS: usize = 6;
+/// Columns of a joint's own: velocity, two shapes of dry friction, velocity squared, acceleration, one, position.
+pub(crate) const FRICTION: usize = 7;
 
 /// What friction of a joint can be in a bin.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -216,7 +218,7 @@ impl JointBins<'_> {
     }
 
     /// Columns of friction, motor inertia, offset and spring of a bin.
-    pub(crate) fn friction(&self, bin: usize) -> [f64; super::design::FRICTION] {
+    pub(crate) fn friction(&self, bin: usize) -> [f64; FRICTION] {
         let [q, v, a, slow, fast] = [1, 2, 3, 4, 5].map(|channel| self.channels[channel][bin]);
         [v, slow, fast, v.abs() * v, a, 1.0, q]
     }

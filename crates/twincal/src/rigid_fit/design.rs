@@ -1,13 +1,11 @@
 //! Columns of bins: inertial parameters of every body, gravity in the base, friction of every joint.
 
-use super::bins::{Bins, Zone};
+use super::bins::{Bins, FRICTION, Zone};
 use crate::robot::{
     BLOCK, BlockWorkspace, Motion, Regressor, Robot, STRIDE, gravity_regressor, nominal_torque,
 };
 use std::ops::Range;
 
-/// Columns of a joint's own: velocity, two shapes of dry friction, velocity squared, acceleration, one, position.
-pub(crate) const FRICTION: usize = 7;
 /// Gravity along the axes of the base: a base that leans is a rigid body's matter, too.
 const GRAVITY: usize = 3;
 /// Prior sd of gravity along an axis, m/s²: a lean of about ten degrees.

@@ -1,9 +1,9 @@
 //! The whole pipeline on motion that is known in closed form.
 
-use super::prepare::JointFacts;
 use super::*;
-use crate::error::Code;
+use crate::error::{Code, Finding, Result};
 use crate::robot::JointKind;
+use crate::signal::log::joints::JointFacts;
 use rand::{RngExt, SeedableRng};
 use std::f64::consts::TAU;
 
@@ -97,7 +97,7 @@ fn pipeline(log: &Recording) -> Pipeline {
 
 fn chosen(log: &Recording, settings: &SignalSettings) -> Result<(Pipeline, Vec<Finding>)> {
     let logs = Logs::from(std::slice::from_ref(log));
-    let chosen = choose::choose(&joints(), &logs.0, settings)?;
+    let chosen = auto::choose::choose(&joints(), &logs.0, settings)?;
     let (pipeline, findings) = (chosen.pipeline, chosen.findings);
     Ok((pipeline, findings))
 }
@@ -272,7 +272,7 @@ fn white_noise_gain_is_what_white_noise_shows() {
     };
     let kernel = fir::column_kernel(5.0, 1e-3);
     let mut out = vec![0.0; x.len() - kernel.len() + 1];
-    convolve::correlate(&kernel, &x, &mut out);
+    filter::convolve::correlate(&kernel, &x, &mut out);
     let sd = (out.iter().map(|v| v * v).sum::<f64>() / out.len() as f64).sqrt();
     assert!((sd / pipeline.noise_gain(1000.0) - 1.0).abs() < 0.2, "{sd}");
 }

@@ -1,6 +1,6 @@
 //! Worlds for tests: what an encoder reads of a known motion, and how a receiver logs it.
 
-use super::{Channels, Payload, Recording};
+use crate::signal::log::recording::{Channels, Payload, Recording};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;

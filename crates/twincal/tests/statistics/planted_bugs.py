@@ -190,7 +190,7 @@ BUGS = [
     ),
     (
         "an exchange that is never refused where it gains little",
-        "infer/gibbs/chain.rs",
+        "infer/gibbs/acceptance.rs",
         "LAZY * gain.exp().min(1.0)",
         "(LAZY * gain.exp()).min(1.0)",
     ),

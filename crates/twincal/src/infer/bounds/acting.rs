@@ -7,6 +7,9 @@ use crate::linear_algebra::Cholesky;
 use crate::posterior::{Model, Site};
 use std::collections::BTreeMap;
 
+/// A bound this many standard deviations below the mean does not act: its mass is 1 − 6e-16.
+pub(super) const FAR: f64 = 8.0;
+
 /// A bound `Σ f β_i ≥ lower` on coefficients of a model, by their place in it.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Bound {
@@ -136,7 +139,7 @@ impl Acting {
                     let square = bound.terms.iter().map(|&(i, f)| f * f * variance(i));
                     (bound, square.sum::<f64>().sqrt())
                 })
-                .filter(|(bound, sd)| -bound.lower < super::FAR * sd)
+                .filter(|(bound, sd)| -bound.lower < FAR * sd)
                 .collect();
             let score: Vec<f64> = own.iter().map(|(b, sd)| -b.lower / sd).collect();
             let shared = |a: &Bound, b: &Bound| -> f64 {

@@ -7,8 +7,8 @@
 //! Σ_{models below} weight · Π factor · (1 + c)^−a_n ≤ weight of the node · Π factor · (1 + c_free)^−a_n,     c_free = c − hᵀ S⁻¹ h
 //! ```
 
+use super::eliminate::{include, reciprocal};
 use super::node::View;
-use super::subtree::{include, reciprocal};
 use super::sums::triangle;
 use super::tally::Tally;
 use super::tree::Tree;

@@ -9,17 +9,23 @@
 //! bound, less than 1e-10 of the sum, or 1e-8 where more than 20 components are to be decided.
 
 mod ahead;
+mod eliminate;
+mod near_root;
 mod node;
 mod plan;
 mod subtree;
 mod sums;
 mod tally;
 mod tree;
+mod walk;
 
 use super::answer::{Averages, LISTED_MASS, LISTED_MODELS, Listed, posterior};
-use super::bounds;
-use super::certain::{self, Certain};
-use super::standard::{Reduced, Standard};
+#[cfg(test)]
+use super::certain;
+use super::certainty::{self, Certain};
+use super::joined::settle;
+use super::reduced::Reduced;
+use super::standard::Standard;
 use crate::error::{Error, Result};
 use crate::posterior::{Method, Posterior, Problem};
 use sums::Layout;
@@ -39,7 +45,7 @@ pub(super) fn enumerate(problem: &Problem) -> Result<Posterior> {
 /// # Errors
 /// Those of [`super::infer`].
 pub(super) fn sum(problem: &Problem, sure: &Certain) -> Result<Posterior> {
-    let (order, certain) = certain::order(&problem.prior, sure);
+    let (order, certain) = certainty::order(&problem.prior, sure);
     if order.len() - certain > BRANCHES {
         return Err(Error::Setting {
             key: "inference.method".into(),
@@ -49,7 +55,7 @@ pub(super) fn sum(problem: &Problem, sure: &Certain) -> Result<Posterior> {
     }
     let standard = Standard::in_order(problem, &order)?;
     let size = standard.size();
-    let (sums, tally) = tree::sum_all_models(&standard, &problem.prior, certain, sure.reference);
+    let (sums, tally) = walk::sum_all_models(&standard, &problem.prior, certain, sure.reference);
     let layout = Layout::new(size);
     let weight = sums[layout.weight()];
     let share = |index: usize| sums[index] / weight;
@@ -74,7 +80,7 @@ pub(super) fn sum(problem: &Problem, sure: &Certain) -> Result<Posterior> {
         })
         .collect();
     let listed = Listed::new(&standard, found, LISTED_MASS, LISTED_MODELS)?;
-    let (listed, log_growth) = bounds::settle(
+    let (listed, log_growth) = settle(
         problem,
         &Reduced::new(&standard, sure),
         &mut averages,

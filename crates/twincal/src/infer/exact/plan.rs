@@ -4,10 +4,10 @@
 //! leaves would be eliminated again under every model of those above it). Members of a family are counted in a few bits
 //! of one number, so that families need not lie together.
 
-use super::node::{Odds, from_lanes};
+use super::node::from_lanes;
 use super::subtree::WRITTEN_OUT;
 use super::tally::Threshold;
-use super::tree::{Choice, Level, Root, Tree};
+use super::tree::{Choice, Level, Odds, Root, Tree};
 use pulp::Simd;
 use pulp::bytemuck::Pod;
 

@@ -416,7 +416,7 @@ fn certain_columns_change_nothing() {
             let certain = certain::components(&standard, &problem, None);
             let count = certain.sure.iter().filter(|c| **c).count();
             assert!(count >= 1 && count < size, "{count} of {size} are certain");
-            let (mut order, first) = certain::order(&problem.prior, &certain);
+            let (mut order, first) = certainty::order(&problem.prior, &certain);
             assert!(first == count && order[..count].iter().all(|&c| certain.sure[c]));
             order.sort_unstable();
             assert!(order.into_iter().eq(0..size));
@@ -428,7 +428,7 @@ fn certain_columns_change_nothing() {
 
 /// A known posterior gives the same answer, by the weight of its heaviest model.
 #[track_caller]
-fn same_with_what_is_near(standard: &Standard, problem: &Problem, certain: &certain::Certain) {
+fn same_with_what_is_near(standard: &Standard, problem: &Problem, certain: &certainty::Certain) {
     let near = enumerate(problem).unwrap();
     certain::components(standard, problem, Some(&near)).is_like(certain);
     let weight = certain::weight_of_heaviest(standard, problem, &near).unwrap();
@@ -506,7 +506,7 @@ fn no_parent_stays_out_below_its_child() {
         let prior = &data.problem.prior;
         let standard = Standard::new(&data.problem).unwrap();
         let sure = certain::components(&standard, &data.problem, None);
-        let (order, certain) = certain::order(prior, &sure);
+        let (order, certain) = certainty::order(prior, &sure);
         assert_eq!(certain > 0, number == 4);
         let below = &order[certain + 3..];
         let before = |(place, &parent): (usize, &usize)| {

@@ -24,7 +24,7 @@ fn what_is_not_visited_does_not_count() {
         }
         let standard = Standard::new(&problem).unwrap();
         let reference = certain::components(&standard, &problem, None).reference;
-        let sums = |reference| tree::sum_all_models(&standard, &problem.prior, 0, reference).0;
+        let sums = |reference| walk::sum_all_models(&standard, &problem.prior, 0, reference).0;
         let all = sums(f64::NEG_INFINITY);
         let layout = Layout::new(size);
         let weight = all[layout.weight()];
@@ -33,7 +33,7 @@ fn what_is_not_visited_does_not_count() {
             "one of them"
         );
         for least in [-15.0, -10.0, -5.0, 0.0, 5.0] {
-            let (some, _, bound) = tree::sum_but(&standard, &problem.prior, 0, reference + least);
+            let (some, _, bound) = walk::sum_but(&standard, &problem.prior, 0, reference + least);
             let some = some[layout.weight()];
             let lost = 1.0 - some / weight;
             assert!(
@@ -86,7 +86,7 @@ fn columns_that_stand_for_each_other_are_visited() {
     let standard = Standard::new(&problem).unwrap();
     let reference = certain::components(&standard, &problem, None).reference;
     let shares = |reference| {
-        let (sums, _) = tree::sum_all_models(&standard, &problem.prior, 0, reference);
+        let (sums, _) = walk::sum_all_models(&standard, &problem.prior, 0, reference);
         let layout = Layout::new(size);
         (0..size)
             .map(|k| sums[layout.inclusion(k)] / sums[layout.weight()])

@@ -9,23 +9,21 @@
 mod admission;
 mod ratios;
 
+use super::acceptance::exchange_chance;
 use super::jumps::Jumps;
 use super::random::Source;
 use super::state::State;
 use super::swaps::Swaps;
 use crate::infer::exchanges::Exchange;
-use crate::infer::standard::{Reduced, Response};
+use crate::infer::reduced::{Reduced, Response};
 use crate::infer::walker::Walker;
 use crate::lanes::LANES;
 use crate::prior::Prior;
 use admission::Admission;
 use pulp::{Simd, WithSimd};
 use ratios::Chunk;
-pub(super) use ratios::to_the;
 use std::collections::BTreeMap;
 
-/// Largest acceptance probability of a move: below 1, or a chain could alternate for ever.
-pub(super) const LAZY: f64 = 0.95;
 /// Exchanges that a scan proposes; most are void.
 const EXCHANGES: usize = 8;
 /// Draws between two jumps: a walk to a model far away costs more than many scans. Draws from listed models are from the whole list
@@ -75,11 +73,6 @@ pub(super) struct Trace {
     pub(super) visits: BTreeMap<Vec<u64>, u64>,
     /// Accepted moves.
     pub(super) moves: u64,
-}
-
-/// Probability that an exchange is accepted which multiplies the weight with `e^gain`.
-pub(super) fn exchange_chance(gain: f64) -> f64 {
-    LAZY * gain.exp().min(1.0)
 }
 
 /// Runs one chain.

@@ -6,10 +6,10 @@
 //! whatever the list is.
 
 use super::state::State;
-use crate::infer::search::{Care, Set};
-use crate::infer::standard::{Reduced, Response};
+use crate::infer::bounds;
+use crate::infer::reduced::{Reduced, Response};
+use crate::infer::search::{self, Care, Set};
 use crate::infer::walker::Walker;
-use crate::infer::{approximate, bounds};
 use crate::posterior::{Posterior, Problem};
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
@@ -54,8 +54,8 @@ impl Jumps {
 
     /// What a search finds, from the models of a near posterior where there is one.
     pub(super) fn of(reduced: &Reduced<'_>, problem: &Problem, near: Option<&Posterior>) -> Self {
-        let near = approximate::models_of(near, reduced.full);
-        let found = approximate::search(reduced, problem, near, BUDGET, Care::Loop);
+        let near = search::models_of(near, reduced.full);
+        let found = search::from_models(reduced, problem, near, BUDGET, Care::Loop);
         let models = found.models.into_iter().map(|(_, set)| set);
         Self::heaviest(models.take(MODELS).collect(), reduced, problem)
     }

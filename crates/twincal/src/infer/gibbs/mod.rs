@@ -3,6 +3,7 @@
 //! Chains start far apart and must agree: if R̂ or the inclusion probabilities of the chains differ, they are run again
 //! with more scans per draw, and refused if that does not help.
 
+mod acceptance;
 mod chain;
 mod jumps;
 mod random;
@@ -11,8 +12,9 @@ mod swaps;
 
 use super::answer::{Averages, LISTED_MASS, LISTED_MODELS, Listed, posterior};
 use super::exchanges::exchanges;
-use super::standard::{Reduced, Standard};
-use super::{InferenceSettings, bounds, certain};
+use super::reduced::Reduced;
+use super::standard::Standard;
+use super::{InferenceSettings, bounds, certain, certainty};
 use crate::diagnostics::{NormalScores, convergence, mcse_mean};
 use crate::error::{Error, Result};
 use crate::posterior::{Method, Posterior, Problem};
@@ -217,7 +219,7 @@ fn longest(
 /// See [`super::scan`].
 pub(super) fn scan(problem: &Problem, scans: usize, seed: u64) -> Result<u64> {
     let standard = Standard::new(problem)?;
-    let reduced = Reduced::whole(&standard, &certain::none(&problem.prior));
+    let reduced = Reduced::whole(&standard, &certainty::none(&problem.prior));
     let target = Target {
         reduced: &reduced,
         prior: &problem.prior,

@@ -1,6 +1,6 @@
 //! What one model says of coefficients and noise, as a chain records it.
 
-use crate::infer::standard::{Reduced, Response};
+use crate::infer::reduced::{Reduced, Response};
 use crate::infer::tableau::Tableau;
 
 /// Natural units, by position of all columns.

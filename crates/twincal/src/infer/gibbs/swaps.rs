@@ -5,7 +5,7 @@
 //! The chance that a proposal is accepted is the mean of the acceptance probabilities over the group, which is computed
 //! once per state.
 
-use super::chain::{LAZY, to_the};
+use super::acceptance::{LAZY, to_the};
 use crate::infer::standard::Standard;
 use crate::infer::walker::Walker;
 use crate::lanes::{LANES, Lane};
@@ -250,8 +250,8 @@ impl Group {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::infer::kin::Step;
     use crate::infer::testing::problem;
-    use crate::infer::walker::Step;
     use crate::prior::Inclusion;
 
     /// Metropolis: every exchange is accepted with the ratio of the two models' weights, slabs and families that differ included.

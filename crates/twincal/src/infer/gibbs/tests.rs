@@ -269,9 +269,9 @@ fn a_child_comes_in_with_its_parent() {
 #[test]
 fn an_exchange_keeps_the_weights() {
     for gain in [0.01, 0.04, 0.06, 1.0, 20.0] {
-        let ratio = chain::exchange_chance(gain) / chain::exchange_chance(-gain);
+        let ratio = acceptance::exchange_chance(gain) / acceptance::exchange_chance(-gain);
         assert!((ratio.ln() - gain).abs() < 1e-12, "{gain}: {}", ratio.ln());
-        assert!(chain::exchange_chance(gain) < 1.0);
+        assert!(acceptance::exchange_chance(gain) < 1.0);
     }
 }
 

@@ -1,9 +1,10 @@
 //! Moments after an exchange against those of a tableau that walked there.
 
+use crate::infer::kin::Step;
 use crate::infer::moments::{Moments, after_exchange, after_flip, present};
 use crate::infer::standard::Standard;
 use crate::infer::testing::grouped;
-use crate::infer::walker::{Step, Walker};
+use crate::infer::walker::Walker;
 
 /// Every flip of a random walk, and every exchange that it passes, of one component for one or two.
 #[test]

@@ -1,6 +1,7 @@
 //! What every flip would do: acceptance ratios, eight at a time.
 
-use super::{Chain, LAZY};
+use super::Chain;
+use crate::infer::gibbs::acceptance::LAZY;
 use crate::infer::standard::Standard;
 use crate::lanes::{LANES, Lane, exp, ln};
 use pulp::Simd;
@@ -153,18 +154,6 @@ fn running_product(mut x: Lane) -> Lane {
         for lane in step..LANES {
             x[lane] = before[lane] * before[lane - step];
         }
-    }
-    x
-}
-
-/// x^power of eight positive numbers.
-#[inline(always)]
-pub(in crate::infer::gibbs) fn to_the<S: Simd>(simd: S, mut x: Lane, power: f64) -> Lane {
-    for vector in S::as_mut_simd_f64s(&mut x).0 {
-        *vector = exp(
-            simd,
-            simd.mul_f64s(simd.splat_f64s(power), ln(simd, *vector)),
-        );
     }
     x
 }

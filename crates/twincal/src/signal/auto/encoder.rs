@@ -1,0 +1,101 @@
+//! What noise an encoder leaves in velocity and acceleration, and the slowest motion that it resolves.
+
+use super::cutoff::JointSpectra;
+use crate::error::{Code, Finding, Severity};
+use crate::signal::clean::correct::DerivedFrom;
+use crate::signal::filter::fir::{MotionKernels, noise_gain};
+use crate::signal::filter::pipeline::Pipeline;
+use crate::signal::filter::spectrum::Noise;
+use crate::signal::log::joints::JointFacts;
+use crate::words::significant;
+
+/// What is known of the encoder of a joint before anything is filtered.
+pub(crate) struct Encoder<'a> {
+    /// Its joint.
+    pub(crate) facts: &'a JointFacts,
+    /// Whether all logs hold its velocity, and its acceleration.
+    pub(crate) logged: [bool; 2],
+    /// Its step, rad or m, if it has one.
+    pub(crate) step: Option<f64>,
+}
+
+/// Velocity that the encoder resolves after the motion filter; says what noise the derivatives carry.
+pub(crate) fn velocity_resolution(
+    joint: usize,
+    encoder: &Encoder<'_>,
+    spectra: &[&JointSpectra],
+    pipeline: &Pipeline,
+    findings: &mut Vec<Finding>,
+) -> f64 {
+    let Encoder {
+        facts,
+        logged: [has_qd, has_qdd],
+        step,
+    } = *encoder;
+    let [velocity_from, derived] = pipeline.sources(joint);
+    let has_qd = has_qd && velocity_from == DerivedFrom::Velocity;
+    let (mut velocity, mut acceleration, mut position) = (0.0_f64, 0.0_f64, 0.0_f64);
+    let mut travel = 0.0_f64;
+    for log in spectra {
+        let kernels = MotionKernels::new(pipeline.motion_cutoff_hz, 1.0 / log.position_noise.rate);
+        let derivatives = [&kernels.smooth, &kernels.first, &kernels.second];
+        // Noise that was differenced n times and is differentiated m times more.
+        let after = |noise: Noise, more: i32| {
+            noise.sd() * noise_gain(derivatives[(noise.order + more).clamp(0, 2) as usize])
+        };
+        position = position.max(log.position_noise.sd());
+        travel = travel.max(after(log.position_noise, 1));
+        velocity = velocity.max(match log.velocity_noise {
+            Some(noise) if has_qd => after(noise, 0),
+            _ => after(log.position_noise, 1),
+        });
+        let (noise, more) = log.source(derived);
+        acceleration = acceleration.max(after(noise, more));
+    }
+    if !has_qdd {
+        let source = match derived {
+            DerivedFrom::Velocity => "the logged velocity",
+            DerivedFrom::Position => "position, twice",
+        };
+        findings.push(Finding::new(
+            Severity::Note,
+            Code::DerivedAcceleration,
+            &facts.name,
+            format!(
+                "joint `{}`: acceleration is not logged and was derived from {source}, by the motion filter at {:.3} Hz; position noise of {}, as the spectrum has it, leaves a noise of {} in velocity and {} in acceleration (SI units, per sample)",
+                facts.name, pipeline.motion_cutoff_hz, significant(position, 2), significant(velocity, 2), significant(acceleration, 2)
+            ),
+            0,
+        ));
+    }
+    let stepping = step.map_or(0.0, |step| 4.0 * pipeline.motion_cutoff_hz * step);
+    if let Some(step) = step.filter(|_| stepping > pipeline.coulomb_velocity) {
+        let [velocity, acceleration] = quantisation_floor(step, spectra, pipeline);
+        findings.push(Finding::new(
+            Severity::Warning,
+            Code::QuantisedEncoder,
+            &facts.name,
+            format!(
+                "joint `{}`: the encoder steps by {}: quantisation alone leaves a noise of {} in velocity and {} in acceleration derived from \
+                 position (SI units, after the motion filter; its whole noise may be more), and one step within the filter's window is {} per s, below which motion cannot be told from standstill; log the encoder's full resolution",
+                facts.name, significant(step, 3), significant(velocity, 2), significant(acceleration, 2), significant(stepping, 3)
+            ),
+            0,
+        ));
+    }
+    stepping.max(3.0 * travel)
+}
+
+/// Noise that an encoder of this step leaves in velocity and acceleration after the motion filter: uniform rounding has
+/// sd `step / √12`.
+fn quantisation_floor(step: f64, spectra: &[&JointSpectra], pipeline: &Pipeline) -> [f64; 2] {
+    let sd = step / 12.0_f64.sqrt();
+    let mut floor = [0.0_f64; 2];
+    for log in spectra {
+        let kernels = MotionKernels::new(pipeline.motion_cutoff_hz, 1.0 / log.position_noise.rate);
+        for (floor, kernel) in floor.iter_mut().zip([&kernels.first, &kernels.second]) {
+            *floor = floor.max(sd * noise_gain(kernel));
+        }
+    }
+    floor
+}

@@ -1,0 +1,457 @@
+//! The clock of one log: which rows go on, where time is cut, and whether what is left ticks evenly.
+
+use super::repeats::{Cut, Sampled, sampled};
+use crate::error::{Code, Error, Finding, Result, Severity, WrongUnit};
+use crate::signal::log::recording::Recording;
+use crate::signal::log::stamps::{EVEN, GAP, median_positive};
+use rayon::prelude::*;
+
+/// Share of intervals' deviation (99 % of them) beyond which a jitter warning is given.
+const JITTER: f64 = 0.2;
+/// Stamps closer than this share of the median interval are one sample, seen twice.
+const CROWDED: f64 = 0.1;
+/// Share of NaN or infinite rows beyond which the log counts as degraded.
+const NOT_FINITE_LIMIT: f64 = 0.01;
+/// Size of a value that is no measurement of any robot in any unit; squares of much larger ones overflow.
+const LARGEST: f64 = 1e12;
+/// Share of contradicting duplicates beyond which the log counts as degraded.
+const CONTRADICTION_LIMIT: f64 = 0.001;
+
+/// Rows of a log without a cut between them.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct Run {
+    /// Ascending indices into the recording.
+    pub(crate) rows: Vec<usize>,
+}
+
+/// What [`read_clock`] found.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Clock {
+    /// In the log's order, none empty.
+    pub(crate) runs: Vec<Run>,
+    /// Median step, or the controller's, s.
+    pub(crate) interval: f64,
+    /// What stands in place of the rows as logged.
+    pub(crate) sampled: Sampled,
+}
+
+impl Clock {
+    /// Stamp of a row, s.
+    pub(crate) fn stamp(&self, log: &Recording, row: usize) -> f64 {
+        self.sampled.time.as_ref().unwrap_or(&log.time)[row]
+    }
+}
+
+fn log_error(log: &Recording, problem: impl Into<String>, remedy: impl Into<String>) -> Error {
+    Error::Log {
+        log: log.name.clone(),
+        problem: problem.into(),
+        remedy: remedy.into(),
+    }
+}
+
+/// All channels of a log with a name for messages.
+fn channels<'a>(log: &'a Recording, names: &[String]) -> Vec<(String, &'a [f64])> {
+    let mut all = vec![("time".to_owned(), log.time.as_slice())];
+    for (joint, name) in log.joints.iter().zip(names) {
+        all.push((format!("position of joint `{name}`"), &joint.q));
+        for (what, channel) in [
+            ("velocity", &joint.qd),
+            ("acceleration", &joint.qdd),
+            ("torque", &joint.tau),
+        ] {
+            if let Some(values) = channel {
+                all.push((format!("{what} of joint `{name}`"), values));
+            }
+        }
+    }
+    all
+}
+
+/// Checks shapes, drops rows that are not finite or repeated, cuts at steps back, gaps and dropped rows.
+///
+/// With `every_row` (pipeline off) repeated stamps stay and the unit of time is only doubted, not refused.
+///
+/// # Errors
+/// [`Error::Log`] if the log is shorter than `minimum` rows, a channel has another length or no finite value, no
+/// time passes, or the median step says that time is not in seconds.
+pub(crate) fn read_clock(
+    log: &Recording,
+    names: &[String],
+    minimum: usize,
+    every_row: bool,
+    findings: &mut Vec<Finding>,
+) -> Result<Clock> {
+    let samples = log.time.len();
+    let channels = channels(log, names);
+    for (name, values) in &channels {
+        if values.len() != samples {
+            return Err(log_error(
+                log,
+                format!("{name} has {} values, time has {samples}", values.len()),
+                "give every channel one value per row",
+            ));
+        }
+    }
+    if samples < minimum {
+        let word = if samples == 1 { "sample" } else { "samples" };
+        return Err(log_error(
+            log,
+            format!("{samples} {word}, needs at least {minimum}"),
+            "record a longer motion",
+        ));
+    }
+    for (name, values) in &channels {
+        if values.iter().all(|v| !v.is_finite()) {
+            return Err(log_error(
+                log,
+                format!("{name} is NaN or infinite in all {samples} rows"),
+                "map the channel to a column that has values, or leave it out",
+            ));
+        }
+    }
+    let (kept, dropped) = finite_rows(log, &channels, findings);
+    let interval = median_interval(log, &kept, every_row, findings)?;
+    let mut rows = Cut {
+        kept: &kept,
+        before: &dropped,
+        interval,
+        every_row,
+    };
+    let sampled = sampled(log, names, &rows, findings);
+    rows.interval = sampled.interval.unwrap_or(interval);
+    let runs = cut(log, &channels, &rows, &sampled, findings);
+    Ok(Clock {
+        runs,
+        interval: rows.interval,
+        sampled,
+    })
+}
+
+/// Rows whose every channel has a sample, and for each whether rows were dropped right before it.
+fn finite_rows(
+    log: &Recording,
+    channels: &[(String, &[f64])],
+    findings: &mut Vec<Finding>,
+) -> (Vec<usize>, Vec<bool>) {
+    let samples = log.time.len();
+    let is_sample = |value: &f64| value.abs() < LARGEST;
+    let all_are = |(_, values): &(String, &[f64])| values.iter().all(is_sample);
+    if channels.par_iter().all(all_are) {
+        return ((0..samples).collect(), vec![false; samples]);
+    }
+    let (mut kept, mut cut_before) = (Vec::with_capacity(samples), Vec::with_capacity(samples));
+    let mut per_channel = vec![0_usize; channels.len()];
+    let mut cut = false;
+    for row in 0..samples {
+        let mut finite = true;
+        for (count, (_, values)) in per_channel.iter_mut().zip(channels) {
+            if !is_sample(&values[row]) {
+                *count += 1;
+                finite = false;
+            }
+        }
+        if finite {
+            kept.push(row);
+            cut_before.push(cut);
+        }
+        cut = !finite;
+    }
+    let lost = samples - kept.len();
+    if let Some(every) = slower_channels(&kept, samples) {
+        let names: Vec<&str> = channels
+            .iter()
+            .zip(&per_channel)
+            .filter(|(_, count)| **count * 10 > samples)
+            .take(4)
+            .map(|((name, _), _)| name.as_str())
+            .collect();
+        let ending = ["th", "st", "nd", "rd"][if every < 4 { every } else { 0 }];
+        findings.push(Finding::new(
+            Severity::Warning,
+            Code::SlowerChannels,
+            &log.name,
+            format!(
+                "{} have a value only in every {every}{ending} row: the log is read at that rate, from the {} rows that hold all channels; they share one clock, so no skew can be estimated",
+                names.join(", "),
+                kept.len()
+            ),
+            lost as u64,
+        ));
+        cut_before.fill(false);
+    } else if lost > 0 {
+        let worst: Vec<String> = channels
+            .iter()
+            .zip(&per_channel)
+            .filter(|(_, count)| **count > 0)
+            .take(4)
+            .map(|((name, _), count)| format!("{name}: {count}"))
+            .collect();
+        let share = lost as f64 / samples as f64;
+        let severity = if share > NOT_FINITE_LIMIT {
+            Severity::Degraded
+        } else {
+            Severity::Warning
+        };
+        findings.push(Finding::new(
+            severity,
+            Code::NotFiniteRows,
+            &log.name,
+            format!(
+                "{lost} of {samples} rows ({:.2} %) have values that are NaN, infinite or beyond {LARGEST:e} ({}) and were dropped; the log is cut there",
+                100.0 * share,
+                worst.join(", ")
+            ),
+            lost as u64,
+        ));
+    }
+    (kept, cut_before)
+}
+
+/// k if nearly all complete rows are k ≥ 2 rows apart: the table joins topics of different rates.
+fn slower_channels(kept: &[usize], samples: usize) -> Option<usize> {
+    let steps = kept.windows(2).map(|pair| pair[1] - pair[0]);
+    let mut sorted: Vec<usize> = steps.clone().collect();
+    sorted.sort_unstable();
+    let every = *sorted.get(sorted.len() / 2).filter(|every| **every >= 2)?;
+    let regular = steps
+        .filter(|step| step.abs_diff(every) <= every / 4)
+        .count();
+    (regular * 10 >= sorted.len() * 9 && kept.len() * every * 5 > samples * 4).then_some(every)
+}
+
+/// Median step of the rows that are kept, if it is plausible.
+fn median_interval(
+    log: &Recording,
+    kept: &[usize],
+    every_row: bool,
+    findings: &mut Vec<Finding>,
+) -> Result<f64> {
+    let steps = kept
+        .windows(2)
+        .map(|pair| log.time[pair[1]] - log.time[pair[0]]);
+    let Some(interval) = median_positive(steps) else {
+        let stamp = |row: Option<&usize>| row.map_or(f64::NAN, |&row| log.time[row]);
+        let (first, last) = (stamp(kept.first()), stamp(kept.last()));
+        let problem = match last < first {
+            true => format!("time runs backwards: the stamps fall from {first} to {last} s"),
+            false => format!("no time passes: every time stamp is {first}"),
+        };
+        return Err(log_error(
+            log,
+            problem,
+            "map the right time column, or give the sampling rate with --rate HZ",
+        ));
+    };
+    if (1e-5..0.5).contains(&interval) {
+        return Ok(interval);
+    }
+    let guess = [
+        (WrongUnit::Milliseconds, "milliseconds", "ms", 1e-3),
+        (WrongUnit::Microseconds, "microseconds", "us", 1e-6),
+        (WrongUnit::Nanoseconds, "nanoseconds", "ns", 1e-9),
+    ]
+    .into_iter()
+    .find(|(.., size)| (10.0..=1e5).contains(&(1.0 / (interval * size))));
+    let (problem, remedy) = match &guess {
+        Some((_, unit, short, size)) => (
+            format!(
+                "the median time step is {interval} s; the stamps look like {unit} ({} Hz)",
+                (1e3 / (interval * size)).round() / 1e3
+            ),
+            format!(
+                "say [columns] time_unit = \"{short}\", divide by {:.0} where the log is made, or give the right --rate HZ",
+                1.0 / size
+            ),
+        ),
+        None => (
+            format!(
+                "the median time step of {interval} s is implausible for a robot log (0.01 ms to 0.5 s)"
+            ),
+            "give time in seconds, or the sampling rate with --rate HZ".to_owned(),
+        ),
+    };
+    if every_row {
+        findings.push(Finding::new(
+            Severity::Warning,
+            Code::ImplausibleTimeStep,
+            &log.name,
+            format!("{problem}; {remedy}. With the filter off time is only copied"),
+            0,
+        ));
+        return Ok(interval);
+    }
+    Err(match guess {
+        Some((unit, ..)) => Error::Unit {
+            log: log.name.clone(),
+            unit,
+            problem,
+            remedy,
+        },
+        None => log_error(log, problem, remedy),
+    })
+}
+
+/// Cuts the kept rows into runs.
+fn cut(
+    log: &Recording,
+    channels: &[(String, &[f64])],
+    rows: &Cut<'_>,
+    sampled: &Sampled,
+    findings: &mut Vec<Finding>,
+) -> Vec<Run> {
+    let (interval, every_row) = (rows.interval, rows.every_row);
+    let time = sampled.time.as_ref().unwrap_or(&log.time);
+    let (mut same, mut contradicting, mut crowded) = (0_u64, 0_u64, 0_u64);
+    let (mut back, mut gaps, mut longest) = (0_u64, 0_u64, 0.0_f64);
+    let mut runs = Vec::new();
+    let mut run = Run::default();
+    let mut cut = false;
+    for (&row, &before) in rows.kept.iter().zip(rows.before) {
+        cut |= before;
+        if sampled.dropped.get(row).is_some_and(|dropped| *dropped) {
+            continue;
+        }
+        let cut = std::mem::take(&mut cut);
+        let Some(&last) = run.rows.last() else {
+            run.rows.push(row);
+            continue;
+        };
+        let step = time[row] - time[last];
+        if step == 0.0 && !every_row {
+            if channels
+                .iter()
+                .all(|(_, values)| values[row] == values[last])
+            {
+                same += 1;
+            } else {
+                contradicting += 1;
+            }
+            continue;
+        }
+        if step > 0.0 && step < CROWDED * interval && !every_row {
+            crowded += 1;
+            continue;
+        }
+        back += u64::from(step < 0.0);
+        let gap = step > GAP * interval;
+        if gap && !cut {
+            gaps += 1;
+            longest = longest.max(step);
+        }
+        if step < 0.0 || gap || cut {
+            runs.push(std::mem::take(&mut run));
+        }
+        run.rows.push(row);
+    }
+    runs.push(run);
+    runs.retain(|run| !run.rows.is_empty());
+
+    let mut say = |severity, code: Code, message: String, count| {
+        findings.push(Finding::new(severity, code, &log.name, message, count));
+    };
+    if same > 0 {
+        let text = format!(
+            "{same} rows repeat the stamp and all values of the row before and were dropped"
+        );
+        say(Severity::Note, Code::DuplicateRows, text, same);
+    }
+    if contradicting > 0 {
+        let share = contradicting as f64 / log.time.len() as f64;
+        let severity = if share > CONTRADICTION_LIMIT {
+            Severity::Degraded
+        } else {
+            Severity::Warning
+        };
+        let text = format!(
+            "{contradicting} rows ({:.3} %) repeat a stamp with other values; the first of each was kept: look at how the log was joined",
+            100.0 * share
+        );
+        say(severity, Code::ContradictingDuplicates, text, contradicting);
+    }
+    if crowded > 0 {
+        let text = format!(
+            "{crowded} rows follow the row before by less than {:.0} % of the median step and were dropped: stamp at the source, not at arrival",
+            100.0 * CROWDED
+        );
+        say(Severity::Warning, Code::CrowdedStamps, text, crowded);
+    }
+    if back > 0 {
+        let text = format!("time steps back {back} times; the log is cut there");
+        say(Severity::Warning, Code::TimeStepsBack, text, back);
+    }
+    if gaps > 0 {
+        let text = format!(
+            "{gaps} gaps longer than {GAP} median steps ({:.6} s), the longest {longest:.6} s; the log is cut there",
+            interval
+        );
+        say(Severity::Note, Code::Gaps, text, gaps);
+    }
+    runs
+}
+
+/// "12", "0.35", "0.0021": two digits, however small.
+fn two_digits(value: f64) -> String {
+    let decimals = if value > 0.0 {
+        (1.0 - value.log10().floor()).clamp(0.0, 9.0) as usize
+    } else {
+        0
+    };
+    format!("{value:.decimals$}")
+}
+
+/// Says how uneven a resampled run is.
+pub(crate) fn report_jitter(
+    log: &Recording,
+    runs: &[Run],
+    clock: &Clock,
+    resampled: u64,
+    findings: &mut Vec<Finding>,
+) {
+    // What was found on repeated rows says it.
+    if clock.sampled.time.is_some() {
+        return;
+    }
+    let interval = clock.interval;
+    let dropped = |row: usize| {
+        clock
+            .sampled
+            .dropped
+            .get(row)
+            .is_some_and(|dropped| *dropped)
+    };
+    let mut deviations: Vec<f64> = runs
+        .iter()
+        .flat_map(|run| run.rows.windows(2))
+        .filter(|pair| !(pair[0]..pair[1]).any(dropped))
+        .map(|pair| ((log.time[pair[1]] - log.time[pair[0]]) / interval - 1.0).abs())
+        .collect();
+    if resampled == 0 || deviations.iter().all(|deviation| *deviation <= EVEN) {
+        return;
+    }
+    let beyond = deviations.iter().filter(|d| **d > JITTER).count();
+    let rank = (deviations.len() - 1) * 99 / 100;
+    let (_, &mut typical, _) = deviations.select_nth_unstable_by(rank, f64::total_cmp);
+    let largest = deviations.iter().copied().fold(0.0, f64::max);
+    let (severity, advice) = if typical > JITTER {
+        (
+            Severity::Warning,
+            "; stamp at the source for a better estimate",
+        )
+    } else {
+        (Severity::Note, "")
+    };
+    findings.push(Finding::new(
+        severity,
+        Code::Resampled,
+        &log.name,
+        format!(
+            "the clock is uneven: 99 % of the steps are within {} % of the median ({:.3} Hz), the largest is off by {} %, {beyond} by more than {:.0} %; resampled by a cubic spline{advice}",
+            two_digits(100.0 * typical),
+            1.0 / interval,
+            two_digits(100.0 * largest),
+            100.0 * JITTER
+        ),
+        resampled,
+    ));
+}
