@@ -197,7 +197,13 @@ impl Road<'_> {
         let only = self.flags.logs.len() == 1;
         let made = match only {
             true => plan_about(about, robot, &read.logs[..], &settings, &step),
-            false => plan_about(about, robot, std::mem::take(&mut read.logs), &settings, &step),
+            false => plan_about(
+                about,
+                robot,
+                std::mem::take(&mut read.logs),
+                &settings,
+                &step,
+            ),
         };
         let (plan, findings) =
             made.map_err(|stopped| Failure::from(read.as_given(stopped.error)))?;
