@@ -1,0 +1,68 @@
+"""Terminal, page, result.json, `check`, `predict`, `diff` and `export` give one answer about one twin, whichever robot it is of."""
+
+import html
+import json
+import re
+
+import pytest
+import specimens
+from conftest import twincal
+
+USABLE = ("yes", "yes_within_limits")
+ROBOTS = [
+    "last_third",
+    "hostile",
+    "many_joints",
+    "simple_pendulum",
+    "double_pendulum",
+    "ur10",
+    "staubli_tx40",
+    "kuka_kr300",
+]
+
+
+def words(text):
+    """In one line, without what a page adds to break it."""
+    return " ".join(html.unescape(re.sub(r"<[^>]*>", "", text.replace("\u200b", ""))).split())
+
+
+@pytest.fixture(params=ROBOTS, scope="module")
+def made(request, tmp_path_factory):
+    folder = tmp_path_factory.mktemp(request.param)
+    page = getattr(specimens, request.param)(folder)
+    out = page.parent
+    return folder, out, page.read_text(), json.loads((out / "result.json").read_text())
+
+
+def test_page_and_terminal_give_the_answer_of_the_result(made):
+    folder, out, page, result = made
+    assessment = result["assessment"]
+    first = (folder / "printed.txt").read_text().splitlines()[0]
+    answer = re.search(r'<section id="answer".*?</section>', page, re.S)
+    assert answer and words(first) in words(answer[0]), first
+    claims = assessment["claims"]
+    assert assessment["reason"] == "passed" or claims[0]["code"] == assessment["reason"]
+    # an answer that begins with yes is given of usable twins alone
+    assert assessment["answer"] in USABLE or not first.startswith("Yes"), first
+
+
+def test_commands_on_a_twin_name_a_doubt_that_it_has(made, tmp_path):
+    _, out, _, result = made
+    doubtful = result["assessment"]["answer"] != "yes"
+    for command in (["diff", out, out], ["export", "--twin", out, "--to", "csv", "-o", tmp_path / "effects.csv"]):
+        done = twincal(*command, expect=None)
+        assert ("can this twin be used?" in words(done.stdout + done.stderr)) == doubtful, command
+
+
+def test_a_check_of_what_was_fitted_has_the_exit_code_of_its_answer(made):
+    folder, out, _, result = made
+    logs = [entry["name"] for entry in result["logs"] if entry["role"] == "fit"]
+    known = {path.name: path for path in [*folder.iterdir(), *specimens.ASSETS.iterdir()]}
+    if result["validation"]["split"] == "not_tested" or any(name not in known for name in logs):
+        pytest.skip("its logs lie elsewhere, or it was never tested")
+    done = twincal("check", *[known[name] for name in logs], "--twin", out, "--json", expect=None)
+    checked = json.loads(done.stdout)
+    lost = any(finding["severity"] == "degraded" for finding in checked["findings"])
+    usable = checked["assessment"]["answer"] in USABLE
+    expected = 1 if checked["assessment"]["answer"] == "no" else 0 if usable and not lost else 3
+    assert done.returncode == expected, checked["assessment"]
