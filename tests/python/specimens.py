@@ -1,4 +1,5 @@
-"""Twins for tests of what people see: each function fits one into a folder and returns its page; what `fit` printed is `printed.txt`."""
+"""Twins for tests of what people see: each function fits one into a folder and returns its page; `printed.txt` is what `fit` printed, `logs.txt`
+the paths of its logs."""
 
 import subprocess
 
@@ -18,6 +19,7 @@ def demo(folder):
 def fitted(folder, model, logs, *arguments):
     done = twincal("fit", *logs, "--model", model, "-o", folder / "out", *arguments, expect=None)
     (folder / "printed.txt").write_text(done.stdout)
+    (folder / "logs.txt").write_text("\n".join(map(str, logs)))
     return folder / "out" / "report.html"
 
 
