@@ -3,10 +3,10 @@
 use super::candidate::Candidate;
 use super::course::anything;
 use super::expression::{Bounded, Graph, Id, Variable, bounded_values};
+use super::motions::Motions;
 use crate::linear_algebra::dot;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
-use std::borrow::Borrow;
 
 /// A column that leaves less than this part of its length outside the span of the columns before it is an alias.
 const TOLERANCE: f64 = 1e-9;
@@ -37,18 +37,6 @@ pub(super) enum Verdict {
     Combination(Vec<(f64, usize)>),
     /// A column, but it exists at too few states where all others do: not compared with them.
     NotCompared,
-}
-
-/// Position, velocity and acceleration of every joint.
-pub(super) type Motions = Vec<[f64; 3]>;
-
-/// Positions, velocities and accelerations of all states, `joint * states + state`.
-pub(super) fn channels<S: Borrow<Motions>>(states: &[S], joints: usize) -> [Vec<f64>; 3] {
-    std::array::from_fn(|k| {
-        (0..joints)
-            .flat_map(|joint| states.iter().map(move |state| state.borrow()[joint][k]))
-            .collect()
-    })
 }
 
 /// Torque of the candidates that are made from the robot model, `(candidate, torque)` with `torque[state * joints + joint]`.

@@ -4,27 +4,26 @@ mod carried;
 mod judged;
 mod linearised;
 
-use super::aliases::{Motions, channels};
 use super::candidate::{Candidate, Joint, Proposal};
-use super::component::{Before, Component, Meaning, Parameter};
+use super::component::{Component, Meaning};
 use super::course::Course;
-use super::directions::Mixture;
 use super::expression::{Graph, Id, Slot, Tape, Variable, bounded_values};
 use super::linearisation::Linearisation;
-use super::model_column::{ModelColumn, ModelColumns};
+use super::mixture::Mixture;
+use super::model_column::{ModelColumn, ModelColumns, Scratch};
+use super::motions::{channels, random_motions};
 use super::overlaps;
+use super::parameter::{Before, Parameter};
 use super::parts::{self, Parts, Torque};
 use super::payload::NAME as PAYLOAD;
 use super::propose::{About, proposals};
 use super::recipes::Recipes;
 use super::sentence::{Estimate, sentence};
+use super::table::Table;
 use super::{Family, LibrarySettings, Status, Term, user};
 use crate::error::{Error, Finding, Result};
 use crate::robot::{JointKind, Motion, Robot};
 use std::sync::Arc;
-
-pub use super::model_column::Scratch;
-pub use super::parts::Table;
 
 /// Ordered terms for one robot, ready to be evaluated. Column k of the regression is the k-th term whose status is
 /// [`Status::Candidate`].
@@ -542,25 +541,3 @@ fn home(components: &[Component], terms: usize) -> Vec<usize> {
 
 /// Bound that never acts: all columns of a component have bounds, or none.
 const UNBOUNDED: f64 = -1e100;
-
-/// States that have nothing in particular in common: a Weyl sequence with irrational steps.
-pub(super) fn random_motions(joints: usize) -> Vec<Motions> {
-    const STATES: usize = 40;
-    let value = |state: usize, joint: usize, k: usize| {
-        let step = ((3 * joint + k + 2) as f64).sqrt() * std::f64::consts::E;
-        2.0 * ((state as f64 + 1.0) * step).fract() - 1.0
-    };
-    (0..STATES)
-        .map(|state| {
-            (0..joints)
-                .map(|joint| {
-                    [
-                        3.0 * value(state, joint, 0),
-                        2.0 * value(state, joint, 1),
-                        5.0 * value(state, joint, 2),
-                    ]
-                })
-                .collect()
-        })
-        .collect()
-}
