@@ -151,7 +151,7 @@ pub(crate) fn check(
     if zero_tensor {
         return Ok(Some(Finding::new(
             Severity::Note,
-            super::dense::CODE,
+            Code::PointMass,
             link,
             format!(
                 "link `{link}`: {mass} kg with inertia tensor 0: taken as a point mass. What its real tensor adds will be reported as motor inertia \
