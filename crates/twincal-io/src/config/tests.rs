@@ -200,106 +200,109 @@ fn case_111_unknown_key_did_you_mean() {
     }
 }
 
+/// A config that is wrong, where its error says that it is, and words of the message.
+const WRONG: [(&str, &str, &str); 20] = [
+    (
+        "[signal]\ncutoff_hz = true",
+        "twincal.toml:2:13",
+        "key `signal.cutoff_hz`: expected a number or \"auto\"",
+    ),
+    (
+        "[signal]\ncutoff_hz = \"fast\"",
+        "twincal.toml:2:13",
+        "a number or \"auto\"",
+    ),
+    (
+        "[signal]\ncutoff_hz = -1.0",
+        "twincal.toml:2:13",
+        "key `signal.cutoff_hz`: -1 is out of range",
+    ),
+    (
+        "[signal]\nrate_hz = 0",
+        "twincal.toml:2:11",
+        "key `signal.rate_hz`: 0 is out of range",
+    ),
+    (
+        "[library]\ncoulomb_velocity = nan",
+        "twincal.toml:2:20",
+        "NaN is out of range",
+    ),
+    (
+        "[inference]\nchains = -4",
+        "twincal.toml:2:10",
+        "key `inference.chains`",
+    ),
+    (
+        "[inference]\nchains = 1",
+        "twincal.toml:2:10",
+        "key `inference.chains`: 1 is out of range",
+    ),
+    (
+        "[inference]\ndraws = 99",
+        "twincal.toml:2:9",
+        "key `inference.draws`: 99 is out of range; give a whole number from 100 to",
+    ),
+    (
+        "[inference]\nmethod = \"exakt\"",
+        "twincal.toml:2:10",
+        "`exact`",
+    ),
+    (
+        "[library]\nfriction = [\"viscos\"]",
+        "twincal.toml:2:13",
+        "`viscous`",
+    ),
+    (
+        "[library]\nterms = \"q1\"",
+        "twincal.toml:2:9",
+        "key `library.terms`",
+    ),
+    (
+        "[prior]\nslab = 3",
+        "twincal.toml:2:8",
+        "expected { scaled_variance = number } or \"auto\"",
+    ),
+    (
+        "[prior]\ninclusion = {}",
+        "twincal.toml:2:13",
+        "neither key",
+    ),
+    (
+        "[prior]\ninclusion = { probability = 0.2, expected_terms = 5 }",
+        "twincal.toml:2:13",
+        "both keys",
+    ),
+    (
+        "[prior.inclusion]\nprobability = 1.0",
+        "twincal.toml:2:15",
+        "1 is out of range",
+    ),
+    (
+        "[check]\ncoverage = [0.99, 0.9]",
+        "twincal.toml:2:12",
+        "not an interval",
+    ),
+    (
+        "[model]\ngravity = [0.0, 1.0]",
+        "twincal.toml:2:11",
+        "key `model.gravity`",
+    ),
+    (
+        "[model]\nlocked = { finger = inf }",
+        "twincal.toml:2:21",
+        "key `model.locked.finger`",
+    ),
+    ("[model\n", "twincal.toml:1:7", ""),
+    (
+        "[noise]\nmodel = \"iid\"\nmodel = \"ar1\"",
+        "twincal.toml:3:1",
+        "duplicate key",
+    ),
+];
+
 #[test]
 fn wrong_types_and_ranges_name_key_and_place() {
-    for (text, place, words) in [
-        (
-            "[signal]\ncutoff_hz = true",
-            "twincal.toml:2:13",
-            "key `signal.cutoff_hz`: expected a number or \"auto\"",
-        ),
-        (
-            "[signal]\ncutoff_hz = \"fast\"",
-            "twincal.toml:2:13",
-            "a number or \"auto\"",
-        ),
-        (
-            "[signal]\ncutoff_hz = -1.0",
-            "twincal.toml:2:13",
-            "key `signal.cutoff_hz`: -1 is out of range",
-        ),
-        (
-            "[signal]\nrate_hz = 0",
-            "twincal.toml:2:11",
-            "key `signal.rate_hz`: 0 is out of range",
-        ),
-        (
-            "[library]\ncoulomb_velocity = nan",
-            "twincal.toml:2:20",
-            "NaN is out of range",
-        ),
-        (
-            "[inference]\nchains = -4",
-            "twincal.toml:2:10",
-            "key `inference.chains`",
-        ),
-        (
-            "[inference]\nchains = 1",
-            "twincal.toml:2:10",
-            "key `inference.chains`: 1 is out of range",
-        ),
-        (
-            "[inference]\ndraws = 99",
-            "twincal.toml:2:9",
-            "key `inference.draws`: 99 is out of range; give a whole number from 100 to",
-        ),
-        (
-            "[inference]\nmethod = \"exakt\"",
-            "twincal.toml:2:10",
-            "`exact`",
-        ),
-        (
-            "[library]\nfriction = [\"viscos\"]",
-            "twincal.toml:2:13",
-            "`viscous`",
-        ),
-        (
-            "[library]\nterms = \"q1\"",
-            "twincal.toml:2:9",
-            "key `library.terms`",
-        ),
-        (
-            "[prior]\nslab = 3",
-            "twincal.toml:2:8",
-            "expected { scaled_variance = number } or \"auto\"",
-        ),
-        (
-            "[prior]\ninclusion = {}",
-            "twincal.toml:2:13",
-            "neither key",
-        ),
-        (
-            "[prior]\ninclusion = { probability = 0.2, expected_terms = 5 }",
-            "twincal.toml:2:13",
-            "both keys",
-        ),
-        (
-            "[prior.inclusion]\nprobability = 1.0",
-            "twincal.toml:2:15",
-            "1 is out of range",
-        ),
-        (
-            "[check]\ncoverage = [0.99, 0.9]",
-            "twincal.toml:2:12",
-            "not an interval",
-        ),
-        (
-            "[model]\ngravity = [0.0, 1.0]",
-            "twincal.toml:2:11",
-            "key `model.gravity`",
-        ),
-        (
-            "[model]\nlocked = { finger = inf }",
-            "twincal.toml:2:21",
-            "key `model.locked.finger`",
-        ),
-        ("[model\n", "twincal.toml:1:7", ""),
-        (
-            "[noise]\nmodel = \"iid\"\nmodel = \"ar1\"",
-            "twincal.toml:3:1",
-            "duplicate key",
-        ),
-    ] {
+    for (text, place, words) in WRONG {
         let message = message(text);
         assert!(message.starts_with(place), "{text}\n{message}");
         assert!(message.contains(words), "{text}\n{message}");

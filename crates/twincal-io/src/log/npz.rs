@@ -99,53 +99,10 @@ pub(super) fn read(
     request: Request<'_>,
 ) -> Result<(Log<'static>, Vec<Finding>)> {
     let name = request.name;
-    let refuse = |problem: String, remedy: &str| Error::content(Place::file(name), problem, remedy);
     directory::check(&mut source, MAX_ARRAYS, name)?;
-    let mut archive = ZipArchive::new(source)
-        .map_err(|e| refuse(format!("is not a whole NPZ file: {e}"), "write it again"))?;
-    if archive.len() > MAX_ARRAYS {
-        let problem = format!("holds {} arrays, the limit is {MAX_ARRAYS}", archive.len());
-        return Err(refuse(problem, "save only the arrays that are needed"));
-    }
-    let mut arrays = Vec::new();
-    let mut names: Vec<String> = Vec::new();
-    for entry in 0..archive.len() {
-        let (key, mut file) = open(&mut archive, entry, name)?;
-        let header = header(&mut file, name, &key)?;
-        if let Number::Text(_) = header.number
-            && NAMES.contains(&key.as_str())
-        {
-            if header.shape.len() == 1 {
-                names = text(file, &header, name, &key)?;
-            }
-            continue;
-        }
-        arrays.push(Array {
-            entry,
-            key,
-            header,
-            first: 0,
-            width: 0,
-        });
-    }
-    let mut columns = Vec::new();
-    for array in &mut arrays {
-        array.first = columns.len();
-        match array.header.shape[..] {
-            [_] => columns.push(array.key.clone()),
-            // Beyond the limit of columns there is nothing but the error.
-            [_, width] if width <= MAX_JOINTS && columns.len() <= MAX_COLUMNS => {
-                let joint = |number: usize| match names.get(number) {
-                    Some(joint) if names.len() == width => format!("{joint}.{}", array.key),
-                    _ => format!("{}{}", array.key, number + 1),
-                };
-                columns.extend((0..width).map(joint));
-            }
-            // Numbers and stacks of tables are not of the log.
-            _ => {}
-        }
-        array.width = columns.len() - array.first;
-    }
+    let mut archive = archive(source, name)?;
+    let (mut arrays, names) = headers(&mut archive, name)?;
+    let mut columns = number_columns(&mut arrays, &names);
     let options = &*arrays::name_columns(
         name,
         &arrays,
@@ -163,6 +120,96 @@ pub(super) fn read(
         wanted.iter().any(|column| range.contains(column))
     };
     let used: Vec<&Array> = arrays.iter().filter(uses).collect();
+    let rows = common_rows(name, &used)?;
+    let mut cells = Cells::reserve(name, rows, wanted.len(), request.chapters)?;
+    let mut sinks = cells.sinks();
+    for array in used {
+        let targets: Vec<Option<usize>> = (array.first..array.first + array.width)
+            .map(|column| wanted.iter().position(|w| *w == column))
+            .collect();
+        let (key, mut file) = open(&mut archive, array.entry, name)?;
+        header(&mut file, name, &key)?;
+        let read = values(&mut file, array, rows, &targets, &mut sinks);
+        if let Err(e) = read.and_then(|()| end(&mut file)) {
+            let damaged = || {
+                let problem = format!("array `{key}` is damaged: {e}");
+                Error::content(Place::file(name), problem, "write it again")
+            };
+            return Err(disk_failure(name, &sinks).unwrap_or_else(damaged));
+        }
+    }
+    let mut findings = Vec::new();
+    let log = assemble(request, cells, selection, &mut findings)?;
+    Ok((log, findings))
+}
+
+/// The file as an archive of at most [`MAX_ARRAYS`] arrays.
+fn archive<R: Read + Seek>(source: R, name: &str) -> Result<ZipArchive<R>> {
+    let refuse = |problem: String, remedy: &str| Error::content(Place::file(name), problem, remedy);
+    let archive = ZipArchive::new(source)
+        .map_err(|e| refuse(format!("is not a whole NPZ file: {e}"), "write it again"))?;
+    if archive.len() > MAX_ARRAYS {
+        let problem = format!("holds {} arrays, the limit is {MAX_ARRAYS}", archive.len());
+        return Err(refuse(problem, "save only the arrays that are needed"));
+    }
+    Ok(archive)
+}
+
+/// All arrays without their columns yet, and the joints that an array of names lists.
+fn headers<R: Read + Seek>(
+    archive: &mut ZipArchive<R>,
+    name: &str,
+) -> Result<(Vec<Array>, Vec<String>)> {
+    let mut arrays = Vec::new();
+    let mut names: Vec<String> = Vec::new();
+    for entry in 0..archive.len() {
+        let (key, mut file) = open(archive, entry, name)?;
+        let header = header(&mut file, name, &key)?;
+        if let Number::Text(_) = header.number
+            && NAMES.contains(&key.as_str())
+        {
+            if header.shape.len() == 1 {
+                names = text(file, &header, name, &key)?;
+            }
+            continue;
+        }
+        arrays.push(Array {
+            entry,
+            key,
+            header,
+            first: 0,
+            width: 0,
+        });
+    }
+    Ok((arrays, names))
+}
+
+/// Names of the columns that the arrays make, array by array.
+fn number_columns(arrays: &mut [Array], names: &[String]) -> Vec<String> {
+    let mut columns = Vec::new();
+    for array in arrays {
+        array.first = columns.len();
+        match array.header.shape[..] {
+            [_] => columns.push(array.key.clone()),
+            // Beyond the limit of columns there is nothing but the error.
+            [_, width] if width <= MAX_JOINTS && columns.len() <= MAX_COLUMNS => {
+                let joint = |number: usize| match names.get(number) {
+                    Some(joint) if names.len() == width => format!("{joint}.{}", array.key),
+                    _ => format!("{}{}", array.key, number + 1),
+                };
+                columns.extend((0..width).map(joint));
+            }
+            // Numbers and stacks of tables are not of the log.
+            _ => {}
+        }
+        array.width = columns.len() - array.first;
+    }
+    columns
+}
+
+/// Rows of the arrays that are read: the same number of each, and all are numbers.
+fn common_rows(name: &str, used: &[&Array]) -> Result<usize> {
+    let refuse = |problem: String, remedy: &str| Error::content(Place::file(name), problem, remedy);
     let is_text = |array: &&&Array| matches!(array.header.number, Number::Text(_));
     if let Some(array) = used.iter().find(is_text) {
         let problem = format!("array `{}` is text, not a number", array.key);
@@ -178,23 +225,7 @@ pub(super) fn read(
             "save arrays of samples × joints with one row per time stamp",
         ));
     }
-    let mut cells = Cells::reserve(name, rows, wanted.len(), request.chapters)?;
-    let mut sinks = cells.sinks();
-    for array in used {
-        let targets: Vec<Option<usize>> = (array.first..array.first + array.width)
-            .map(|column| wanted.iter().position(|w| *w == column))
-            .collect();
-        let (key, mut file) = open(&mut archive, array.entry, name)?;
-        header(&mut file, name, &key)?;
-        let read = values(&mut file, array, rows, &targets, &mut sinks);
-        if let Err(e) = read.and_then(|()| end(&mut file)) {
-            let damaged = || refuse(format!("array `{key}` is damaged: {e}"), "write it again");
-            return Err(disk_failure(name, &sinks).unwrap_or_else(damaged));
-        }
-    }
-    let mut findings = Vec::new();
-    let log = assemble(request, cells, selection, &mut findings)?;
-    Ok((log, findings))
+    Ok(rows)
 }
 
 /// An array of a channel that has one row per joint, and as many columns as another array has samples.

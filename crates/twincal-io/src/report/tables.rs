@@ -8,7 +8,7 @@ use crate::words::units::{pooled_unit, unit_of};
 use serde::Serialize;
 use twincal::assess::{converged, friction_only, standstill};
 use twincal::calibrate::{Calibration, LogSummary};
-use twincal::posterior::Method;
+use twincal::posterior::{Method, Model, Posterior};
 use twincal::signal::Pipeline;
 use twincal::validate::Scores;
 
@@ -273,49 +273,15 @@ pub(super) fn convergence(calibration: &Calibration) -> Vec<String> {
                 if r_hat.is_finite() { format!("{r_hat:.3}") } else { "–".into() },
                 count(ess.max(0.0) as u64),
             ));
-            out.push(if converged(calibration) {
-                "The chains agree.".into()
-            } else {
-                "The chains have not converged: raise [inference] draws, or use fewer candidates and method = \"exact\".".into()
-            });
-            let worst = posterior.inclusion_mcse.iter().copied().fold(0.0, f64::max);
-            out.push(format!(
-                "Largest Monte Carlo standard error of a probability: {}.",
-                number(worst, 2)
-            ));
-            let undecided: Vec<_> = calibration
-                .terms
-                .iter()
-                .filter(|t| {
-                    t.pip
-                        .zip(t.pip_mcse)
-                        .is_some_and(|(p, e)| e > 0.0 && (p - 0.5).abs() < 3.0 * e)
-                })
-                .map(|t| t.term.name.as_str())
-                .collect();
-            if !undecided.is_empty() {
-                out.push(format!(
-                    "Too close to 0.5 to decide with these draws: {}.",
-                    list(&undecided)
-                ));
-            }
+            out.extend(chains_agree(calibration));
         }
     }
-    if let Some(first) = posterior.models.first() {
-        out.push(format!(
-            "The most probable model has probability {} and {}; intervals use the most probable models ({}), which {}.",
-            probability(first.weight * posterior.models_mass),
-            match first.members.len() {
-                1 => "one term".into(),
-                n => format!("{n} terms"),
-            },
-            count(posterior.models.len() as u64),
-            match 1.0 - posterior.models_mass {
-                rest if rest > 0.0 => format!("leave out {} of the probability", number(rest, 2)),
-                _ => "are all that count".into(),
-            },
-        ));
-    }
+    out.extend(
+        posterior
+            .models
+            .first()
+            .map(|first| most_probable(posterior, first)),
+    );
     if let Some(evidence) = posterior.log_evidence {
         out.push(format!(
             "Log evidence of the whole library: {}.",
@@ -323,6 +289,56 @@ pub(super) fn convergence(calibration: &Calibration) -> Vec<String> {
         ));
     }
     out
+}
+
+/// Whether chains agree, and what their draws leave open.
+fn chains_agree(calibration: &Calibration) -> Vec<String> {
+    let posterior = &calibration.twin.posterior;
+    let agree = if converged(calibration) {
+        "The chains agree.".into()
+    } else {
+        "The chains have not converged: raise [inference] draws, or use fewer candidates and method = \"exact\".".into()
+    };
+    let worst = posterior.inclusion_mcse.iter().copied().fold(0.0, f64::max);
+    let error = format!(
+        "Largest Monte Carlo standard error of a probability: {}.",
+        number(worst, 2)
+    );
+    let mut out = vec![agree, error];
+    let undecided: Vec<_> = calibration
+        .terms
+        .iter()
+        .filter(|t| {
+            t.pip
+                .zip(t.pip_mcse)
+                .is_some_and(|(p, e)| e > 0.0 && (p - 0.5).abs() < 3.0 * e)
+        })
+        .map(|t| t.term.name.as_str())
+        .collect();
+    if !undecided.is_empty() {
+        out.push(format!(
+            "Too close to 0.5 to decide with these draws: {}.",
+            list(&undecided)
+        ));
+    }
+    out
+}
+
+/// What the most probable model counts, and the models that intervals use.
+fn most_probable(posterior: &Posterior, first: &Model) -> String {
+    format!(
+        "The most probable model has probability {} and {}; intervals use the most probable models ({}), which {}.",
+        probability(first.weight * posterior.models_mass),
+        match first.members.len() {
+            1 => "one term".into(),
+            n => format!("{n} terms"),
+        },
+        count(posterior.models.len() as u64),
+        match 1.0 - posterior.models_mass {
+            rest if rest > 0.0 => format!("leave out {} of the probability", number(rest, 2)),
+            _ => "are all that count".into(),
+        },
+    )
 }
 
 /// The signal pipeline as used.

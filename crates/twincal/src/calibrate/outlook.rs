@@ -5,7 +5,7 @@ use crate::excitation::{Excitation, STATES, States, excitation};
 use crate::gram::{Gram, JointAccumulator, Workspace};
 use crate::incidents::{Incident, leave_out};
 use crate::robot::Robot;
-use crate::rows::{RowSignal, count_rows, visit_rows};
+use crate::rows::{RowBlock, RowSignal, count_rows, visit_rows};
 use crate::signal::{Log, Payload, Pipeline, Raw, Trajectory, prepare, ready};
 use crate::term::{Library, LibrarySettings};
 
@@ -84,62 +84,24 @@ fn statistics(
     pipeline: &Pipeline,
     logs: &[LookedAt<'_>],
 ) -> Result<(Gram, States)> {
-    let dof = robot.dof();
-    let mut count = 0;
+    let mut rows = 0;
     for LookedAt {
         log, trajectory, ..
     } in logs
     {
-        count += match log {
+        rows += match log {
             Log::Whole(_) => count_rows(pipeline, trajectory, RowSignal::Filtered),
             Log::Long(_) => ready(robot, log, pipeline)?.rows_at_most(pipeline),
         };
     }
-    let step = (count / STATES).max(1);
-    let mut accumulators: Vec<JointAccumulator> = (0..dof)
-        .map(|joint| {
-            let columns = library.columns_of_joint(joint).iter();
-            JointAccumulator::new(columns.map(|&column| column as u32).collect())
-        })
-        .collect();
-    let mut workspace = Workspace::default();
-    let mut kept = vec![[(); 3].map(|()| Vec::new()); dof];
-    let mut still = vec![Vec::new(); dof];
-    let mut row = 0;
+    let mut sums = RowSums::new(library, (rows / STATES).max(1));
     let mut look = |trajectory: &Trajectory| {
-        visit_rows(
-            robot,
-            library,
-            pipeline,
-            trajectory,
-            RowSignal::Filtered,
-            &mut |block| {
-                let wanted: Vec<usize> = (0..block.len).filter(|k| (row + k) % step == 0).collect();
-                row += block.len;
-                let nothing = vec![0.0; block.len];
-                for (joint, rows) in block.joints.iter().enumerate() {
-                    let keep: Vec<bool> = rows.standstill.iter().map(|still| !still).collect();
-                    accumulators[joint].push_block(
-                        rows.x,
-                        rows.stride,
-                        &nothing,
-                        &keep,
-                        block.first,
-                        &mut workspace,
-                    );
-                    for &k in &wanted {
-                        let at = joint * block.len + k;
-                        for (kept, values) in
-                            kept[joint].iter_mut().zip([block.q, block.qd, block.qdd])
-                        {
-                            kept.push(values[at]);
-                        }
-                        still[joint].push(rows.standstill[k]);
-                    }
-                }
-                Ok(())
-            },
-        )
+        let mut add = |block: &RowBlock<'_>| {
+            sums.add(block);
+            Ok(())
+        };
+        let signal = RowSignal::Filtered;
+        visit_rows(robot, library, pipeline, trajectory, signal, &mut add)
     };
     for LookedAt {
         log,
@@ -158,22 +120,84 @@ fn statistics(
             })?,
         }
     }
-    let channel = |k: usize| -> Vec<f64> {
-        let of_joints = kept.iter().flat_map(|joint| joint[k].iter());
-        of_joints.copied().collect()
-    };
-    let states = States {
-        len: still.first().map_or(0, Vec::len),
-        q: channel(0),
-        qd: channel(1),
-        qdd: channel(2),
-        still: still.concat(),
-    };
-    let joints = accumulators.into_iter().map(JointAccumulator::finish);
-    Ok((
-        Gram {
-            joints: joints.collect(),
-        },
-        states,
-    ))
+    Ok(sums.finish())
+}
+
+/// Sums over rows of every joint, and the states of every `step`-th row.
+struct RowSums {
+    accumulators: Vec<JointAccumulator>,
+    workspace: Workspace,
+    /// Rows from one kept state to the next.
+    step: usize,
+    rows: usize,
+    /// Position, velocity and acceleration of every joint in the kept states.
+    kept: Vec<[Vec<f64>; 3]>,
+    /// Whether a joint is at rest in them.
+    at_rest: Vec<Vec<bool>>,
+}
+
+impl RowSums {
+    fn new(library: &Library, step: usize) -> Self {
+        let accumulator = |joint: usize| {
+            let columns = library.columns_of_joint(joint).iter();
+            JointAccumulator::new(columns.map(|&column| column as u32).collect())
+        };
+        let joints = library.joints();
+        Self {
+            accumulators: (0..joints).map(accumulator).collect(),
+            workspace: Workspace::default(),
+            step,
+            rows: 0,
+            kept: vec![[(); 3].map(|()| Vec::new()); joints],
+            at_rest: vec![Vec::new(); joints],
+        }
+    }
+
+    fn add(&mut self, block: &RowBlock<'_>) {
+        let wanted: Vec<usize> = (0..block.len)
+            .filter(|k| (self.rows + k) % self.step == 0)
+            .collect();
+        self.rows += block.len;
+        let no_torque = vec![0.0; block.len];
+        for (joint, rows) in block.joints.iter().enumerate() {
+            let keep: Vec<bool> = rows.standstill.iter().map(|still| !still).collect();
+            self.accumulators[joint].push_block(
+                rows.x,
+                rows.stride,
+                &no_torque,
+                &keep,
+                block.first,
+                &mut self.workspace,
+            );
+            for &k in &wanted {
+                let at = joint * block.len + k;
+                let state = [block.q, block.qd, block.qdd];
+                for (kept, values) in self.kept[joint].iter_mut().zip(state) {
+                    kept.push(values[at]);
+                }
+                self.at_rest[joint].push(rows.standstill[k]);
+            }
+        }
+    }
+
+    fn finish(self) -> (Gram, States) {
+        let channel = |k: usize| -> Vec<f64> {
+            let of_joints = self.kept.iter().flat_map(|joint| joint[k].iter());
+            of_joints.copied().collect()
+        };
+        let states = States {
+            len: self.at_rest.first().map_or(0, Vec::len),
+            q: channel(0),
+            qd: channel(1),
+            qdd: channel(2),
+            still: self.at_rest.concat(),
+        };
+        let joints = self.accumulators.into_iter().map(JointAccumulator::finish);
+        (
+            Gram {
+                joints: joints.collect(),
+            },
+            states,
+        )
+    }
 }

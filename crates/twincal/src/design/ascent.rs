@@ -9,12 +9,13 @@
 //! # Source
 //! Conjugate directions: Polak and Ribière 1969.
 
-use super::Task;
 use super::clearance::NearSlope;
-use super::information::{Objective, SAMPLES, states_of};
+use super::found::Found;
+use super::information::{Objective, states_of};
+use super::limits::JointLimits;
 use super::metric::Metric;
-use super::search::{Found, PER_SPAN};
-use super::spline::{DEGREE, HELD, Spline, StateWeights, steps};
+use super::spline::{DEGREE, HELD, SAMPLES, Spline, StateWeights, steps};
+use super::task::Task;
 use crate::excitation::States;
 use crate::linear_algebra::dot;
 
@@ -37,6 +38,8 @@ const HALVINGS: usize = 10;
 /// Largest share of a torque limit that the barrier sees.
 const FULL: f64 = 0.9999;
 
+/// Samples of a span at which distances are looked at; between two of them what moves adds to the margin.
+const PER_SPAN: usize = 512;
 /// Moments that are watched at most; the oldest goes first.
 const MOMENTS: usize = 200;
 
@@ -110,7 +113,7 @@ impl<'a> Climb<'a> {
         Self {
             task,
             objective,
-            bounds: task.limits.iter().map(super::search::bounds).collect(),
+            bounds: task.limits.iter().map(JointLimits::bounds).collect(),
             spans,
             rows,
             duration,

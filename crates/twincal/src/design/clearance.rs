@@ -59,6 +59,18 @@ pub struct Approach {
     pub time: f64,
 }
 
+impl Approach {
+    /// Who comes how close, and when.
+    pub(super) fn in_words(&self) -> String {
+        let [one, other] = &self.between;
+        format!(
+            "`{one}` and `{other}` would be {} m apart at {} s",
+            crate::words::significant(self.distance, 2),
+            crate::words::significant(self.time, 3)
+        )
+    }
+}
+
 /// How what is left between two things changes with the positions of the joints.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NearSlope {

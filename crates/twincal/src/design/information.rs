@@ -1,7 +1,7 @@
 //! What rows of a motion say of independent columns: M = Σ Φᵀ W Φ.
 
 use super::criterion::Criterion;
-use super::spline::{Spline, StateWeights};
+use super::spline::{SAMPLES, Spline, StateWeights};
 use crate::excitation::{Reference, STATES, States, random_states, reference};
 use crate::linear_algebra::{product, symmetric_eigen};
 use crate::robot::Robot;
@@ -11,8 +11,6 @@ use crate::term::Library;
 const INDEPENDENT: f64 = 1e-6;
 /// Information of every column before the motion, in rows: what keeps a matrix of few rows from being singular.
 const BEFORE: f64 = 1e-6;
-/// Samples of a span.
-pub(super) const SAMPLES: usize = 4;
 
 /// What a search maximises: a function of sums over the rows of a motion.
 pub(super) trait Objective: Sync {

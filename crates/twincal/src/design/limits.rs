@@ -54,6 +54,19 @@ pub struct JointLimits {
     pub beyond_model: Vec<&'static str>,
 }
 
+impl JointLimits {
+    /// Bounds on position, velocity, acceleration and jerk.
+    pub(super) fn bounds(&self) -> [[f64; 2]; 4] {
+        let even = |most: f64| [-most, most];
+        [
+            self.position,
+            even(self.velocity),
+            even(self.acceleration),
+            even(self.jerk),
+        ]
+    }
+}
+
 /// Limits of every joint: stated ones, those of the model file, and what is assumed.
 ///
 /// # Errors

@@ -15,17 +15,20 @@
 mod ascent;
 mod clearance;
 mod criterion;
+mod found;
 mod information;
 mod limits;
 mod load;
 mod metric;
 mod motion;
+mod promises;
 mod questions;
 mod recorded;
 mod search;
 mod sizes;
 mod spline;
 mod structural;
+mod task;
 mod torque;
 #[cfg(test)]
 mod tests;
@@ -35,24 +38,24 @@ pub use criterion::Criterion;
 pub use limits::{JERK_TIME, JointLimits, SPEED_UP, StatedLimits, joint_limits, spread_positions};
 pub use load::{Load, Loaded};
 pub use motion::{DesignedMotion, JointUse};
-pub use questions::{Promise, Questions};
+pub use promises::Promise;
+pub use questions::Questions;
 pub use recorded::Recorded;
 pub use structural::OtherRecording;
-pub use torque::{FoundTorque, NominalTorque};
+pub use task::Task;
+pub use torque::{FoundTorque, NominalTorque, TorqueLimits};
 
 use crate::error::{Error, Result};
 use crate::excitation::States;
-use crate::robot::Robot;
-use crate::term::Library;
+use found::Found;
 use information::{Information, Objective};
 use rayon::prelude::*;
 use recorded::Following;
-use search::{Chain, Found};
+use search::Chain;
+use spline::SPAN;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Length of a span of the splines, s, where the motion is long enough.
-const SPAN: f64 = 0.25;
 /// Spans at least: five control points at either end stay, and some have to move.
 const LEAST_SPANS: usize = 10;
 /// Samples at least.
@@ -99,35 +102,6 @@ impl Default for DesignSettings {
             criterion: Criterion::Determinant,
         }
     }
-}
-
-/// Whether a robot can produce the torque that states ask for.
-pub trait TorqueLimits: Sync {
-    /// |τ| of every joint in every state as a share of what may be used of its limit, `[joint * len + state]`.
-    fn shares(&self, states: &States) -> Vec<f64>;
-
-    /// Name of the joint that has too little torque in some state, with that torque and its limit.
-    fn exceeded(&self, states: &States) -> Option<(String, f64, f64)>;
-}
-
-/// What is asked for.
-#[derive(Clone, Copy)]
-#[allow(missing_debug_implementations, reason = "the limits are trait objects")]
-pub struct Task<'a> {
-    /// The robot.
-    pub robot: &'a Robot,
-    /// Candidates: their columns are what the motion is to show where nothing is asked, and what its condition number is of.
-    pub library: &'a Library,
-    /// `None`: the motion is to show the candidates.
-    pub questions: Option<&'a Questions<'a>>,
-    /// Motion that is recorded already, and that a fit will have beside this one.
-    pub recorded: Option<&'a Recorded>,
-    /// What every joint stays within.
-    pub limits: &'a [JointLimits],
-    /// `None`: torque is not looked at.
-    pub torque: Option<&'a dyn TorqueLimits>,
-    /// `None`: collisions are not looked at.
-    pub clearance: Option<&'a dyn Clearance>,
 }
 
 /// How far a search has come.

@@ -1,16 +1,17 @@
 //! The motion that was found, at the controller's rate, checked once more between the samples of the search.
 
-use super::clearance::{Approach, path_of};
+use super::clearance::path_of;
+use super::found::Found;
 use super::information::{Information, Objective as _, states_of};
+use super::limits::JointLimits;
 use super::recorded::{Following, Recorded};
-use super::search::Found;
 use super::spline::{Spline, StateWeights};
+use super::task::Task;
 use super::torque::TORQUE_SHARE;
-use super::{Design, DesignSettings, JointLimits, Task};
+use super::{Design, DesignSettings};
 use crate::error::{Error, Result};
 use crate::excitation::{STATES, States, random_states};
 use serde::Serialize;
-use std::ops::Range;
 
 /// Factor on the motion about its start where a sample between those of the search breaks a limit, and how often.
 const SMALLER: f64 = 0.97;
@@ -65,11 +66,8 @@ pub(super) fn finished(
         let states = sampled(&splines, settings);
         let spans = splines[0].points.len() - 5;
         let broken = (task.too_much_torque(&states)).or_else(|| {
-            Some(in_words(&task.too_close(
-                &splines,
-                (0..spans, None),
-                PER_SPAN,
-            )?))
+            let approach = task.too_close(&splines, (0..spans, None), PER_SPAN)?;
+            Some(approach.in_words())
         });
         match broken {
             None => return described(task, settings, information, (&splines, states), stopped),
@@ -162,39 +160,6 @@ fn sampled(splines: &[Spline], settings: &DesignSettings) -> States {
         }
     }
     states
-}
-
-impl Task<'_> {
-    /// The joint that has too little torque in some state, in words.
-    pub(super) fn too_much_torque(&self, states: &States) -> Option<String> {
-        let (joint, torque, limit) = self.torque?.exceeded(states)?;
-        Some(format!(
-            "joint `{joint}` would need {} of torque, its limit is {}",
-            crate::words::significant(torque, 3),
-            crate::words::significant(limit, 3)
-        ))
-    }
-
-    /// What comes too close in some spans.
-    pub(super) fn too_close(
-        &self,
-        splines: &[Spline],
-        (spans, joint): (Range<usize>, Option<usize>),
-        per_span: usize,
-    ) -> Option<Approach> {
-        let clearance = self.clearance?;
-        clearance.breach(&path_of(splines, spans, per_span), joint)
-    }
-}
-
-/// An approach in words.
-pub(super) fn in_words(approach: &Approach) -> String {
-    let [one, other] = &approach.between;
-    format!(
-        "`{one}` and `{other}` would be {} m apart at {} s",
-        crate::words::significant(approach.distance, 2),
-        crate::words::significant(approach.time, 3)
-    )
 }
 
 /// What the samples use of the limits.

@@ -1,4 +1,4 @@
-//! Open questions of a posterior, what rows of a motion say of them, and whether the motion decides them.
+//! Open questions of a posterior, and what rows of a motion say of them.
 //!
 //! ```text
 //! A = G + G_new + V⁻¹                           precision of the columns in question, after the motion
@@ -12,37 +12,23 @@
 use super::information::{Objective, quadratic};
 use super::load::Loaded;
 use super::sizes;
-use super::structural::OtherRecording;
 use crate::error::{Error, Result};
 use crate::excitation::States;
-use crate::infer::approximate;
 use crate::likelihood::JointNoise;
 use crate::linear_algebra::{Cholesky, product, product_transposed};
 use crate::posterior::{OPEN, Posterior, Problem};
-use crate::random::Random;
 use crate::term::Library;
 use crate::twin::Twin;
-use rayon::prelude::*;
-use serde::Serialize;
 
 /// A column takes part in the search from this inclusion probability on.
 const ACTIVE: f64 = 0.02;
 /// Weight of ln det A beside the questions.
 const REST: f64 = 0.02;
-/// Robots that are drawn from the posterior to see whether the motion decides.
-const WORLDS: usize = 64;
-/// Random streams of those worlds and of their noise.
-const STREAM: u64 = 11 << 60;
-const NOISE: u64 = STREAM + (1 << 40);
-
-/// The motion to come and the recorded one, each with its length in s.
-type Motions<'a> = [Option<(&'a States, f64)>; 2];
-
 /// What is asked of a posterior.
 #[derive(Debug)]
 pub struct Questions<'a> {
-    problem: &'a Problem,
-    posterior: &'a Posterior,
+    pub(super) problem: &'a Problem,
+    pub(super) posterior: &'a Posterior,
     pub(super) twin: &'a Twin,
     pub(super) library: &'a Library,
     /// The library in the motion to come.
@@ -50,7 +36,7 @@ pub struct Questions<'a> {
     /// What a row of each joint counts, 1/(N·m)² in units of φ.
     factor: Vec<f64>,
     /// Independent rows of each joint per row.
-    shares: Vec<f64>,
+    pub(super) shares: Vec<f64>,
     /// Rows per second that a fit keeps.
     rate: f64,
     /// Columns that take part, ascending.
@@ -61,32 +47,13 @@ pub struct Questions<'a> {
 /// One effect that may be there or not.
 #[derive(Debug, Clone)]
 pub(super) struct Question {
-    name: String,
+    pub(super) name: String,
     /// Places among the active columns.
-    places: Vec<usize>,
+    pub(super) places: Vec<usize>,
     /// Columns that are large or small together: its own, and those of what goes with it.
-    sized: Vec<u32>,
+    pub(super) sized: Vec<u32>,
     /// E[β βᵀ | in].
     second: Vec<f64>,
-}
-
-/// What a motion is expected to say of one question, by simulation from the posterior.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Promise {
-    /// Name of the effect.
-    pub effect: String,
-    /// Its probability now.
-    pub pip: f64,
-    /// Probability that its PIP leaves 0.05 … 0.95 on the side of the truth.
-    pub right: f64,
-    /// That it leaves it on the other side.
-    pub wrong: f64,
-    /// Median sd of its first coefficient afterwards, where it is there.
-    pub sd: Option<f64>,
-    /// No motion of this robot distinguishes it from the others.
-    pub structural: bool,
-    /// What does, where it is structural.
-    pub decided_by: Vec<OtherRecording>,
 }
 
 impl<'a> Questions<'a> {
@@ -213,7 +180,7 @@ impl<'a> Questions<'a> {
     }
 
     /// What rows of the motion count as rows of a fit.
-    fn scale(&self, rows: f64, duration: f64) -> f64 {
+    pub(super) fn scale(&self, rows: f64, duration: f64) -> f64 {
         self.rate * duration / rows
     }
 
@@ -250,118 +217,6 @@ impl<'a> Questions<'a> {
         }
         sums
     }
-
-    /// What motions add to the regression, each with its length in s: sums of all columns, and rows that count as independent.
-    fn added(&self, motions: Motions<'_>) -> (Vec<f64>, f64) {
-        let all: Vec<usize> = (0..self.problem.names.len()).collect();
-        let (mut gram, mut counted) = (vec![0.0; all.len() * all.len()], 0.0);
-        for (motion, library) in motions.into_iter().zip([self.coming, self.library]) {
-            let Some((states, seconds)) = motion else {
-                continue;
-            };
-            let scale = self.scale(states.len.max(1) as f64, seconds);
-            let own = self.sums_of(library, &all, states);
-            (gram.iter_mut().zip(own)).for_each(|(sum, own)| *sum += scale * own);
-            let joints = self
-                .shares
-                .iter()
-                .zip(states.still.chunks(states.len.max(1)));
-            for (share, still) in joints {
-                let rows = still.iter().filter(|still| !**still).count();
-                counted += share * scale * rows as f64;
-            }
-        }
-        (gram, counted)
-    }
-
-    /// Whether motions decide each question, in worlds drawn from the posterior.
-    ///
-    /// # Errors
-    /// Those of inference.
-    pub(super) fn promises(
-        &self,
-        (motions, random): (Motions<'_>, &States),
-        seed: u64,
-    ) -> Result<Vec<Promise>> {
-        let (gram, counted) = self.added(motions);
-        let sized: Vec<&[u32]> = self.open.iter().map(|own| own.sized.as_slice()).collect();
-        let known = (self.problem, self.posterior);
-        let robots = sizes::robots(known, &sized, (WORLDS, seed, STREAM));
-        let judged: Vec<Vec<Judged>> = robots
-            .par_iter()
-            .enumerate()
-            .map(|(world, (beta, noise))| {
-                let mut random = Random::new(seed, NOISE + world as u64);
-                let problem = self.after(&gram, (beta, *noise), counted, &mut random);
-                let posterior = approximate(&problem, Some(self.posterior))?;
-                Ok(self.judged(beta, &posterior))
-            })
-            .collect::<Result<_>>()?;
-        let structural = self.structural(random)?;
-        let promise = |(at, question): (usize, &Question)| {
-            let own: Vec<&Judged> = judged.iter().map(|world| &world[at]).collect();
-            let share = |side: Option<bool>| {
-                own.iter().filter(|own| own.right == side).count() as f64 / own.len().max(1) as f64
-            };
-            let mut sds: Vec<f64> = own.iter().filter_map(|own| own.sd).collect();
-            sds.sort_by(f64::total_cmp);
-            let first = self.active[question.places[0]];
-            Promise {
-                effect: question.name.clone(),
-                pip: self.posterior.inclusion[first],
-                right: share(Some(true)),
-                wrong: share(Some(false)),
-                sd: sds.get(sds.len() / 2).copied(),
-                structural: structural[at].is_some(),
-                decided_by: structural[at].clone().unwrap_or_default(),
-            }
-        };
-        Ok(self.open.iter().enumerate().map(promise).collect())
-    }
-
-    /// The regression with rows of the motion added: r = G β + φ^½ L ξ.
-    fn after(
-        &self,
-        gram: &[f64],
-        (beta, noise): (&[f64], f64),
-        counted: f64,
-        random: &mut Random,
-    ) -> Problem {
-        let size = beta.len();
-        let mut problem = self.problem.clone();
-        let shaken = shaken(gram, size, random);
-        let (mut explained, mut cross) = (0.0, 0.0);
-        for a in 0..size {
-            let row = &gram[a * size..(a + 1) * size];
-            let through: f64 = row.iter().zip(beta).map(|(g, b)| g * b).sum();
-            explained += beta[a] * through;
-            cross += beta[a] * shaken[a];
-            problem.xy[a] += through + noise.sqrt() * shaken[a];
-        }
-        (problem.gram.iter_mut().zip(gram)).for_each(|(sum, own)| *sum += own);
-        problem.yy += explained + 2.0 * noise.sqrt() * cross + noise * counted;
-        problem.n += counted;
-        problem
-    }
-
-    /// Each question in one world.
-    fn judged(&self, beta: &[f64], posterior: &Posterior) -> Vec<Judged> {
-        let of = |question: &Question| {
-            let first = self.active[question.places[0]];
-            let is_there = (question.places.iter()).any(|&at| beta[self.active[at]] != 0.0);
-            let pip = posterior.inclusion[first];
-            let said = match pip {
-                pip if pip >= OPEN[1] => Some(true),
-                pip if pip <= OPEN[0] => Some(false),
-                _ => None,
-            };
-            Judged {
-                right: said.map(|said| said == is_there),
-                sd: is_there.then(|| posterior.sd[first]),
-            }
-        };
-        self.open.iter().map(of).collect()
-    }
 }
 
 /// Name of every component of a regression.
@@ -392,35 +247,6 @@ fn shares(noise: &[JointNoise]) -> Vec<f64> {
     noise
         .iter()
         .map(|own| share(own).unwrap_or(least))
-        .collect()
-}
-
-/// One question in one world.
-struct Judged {
-    /// `None`: still open.
-    right: Option<bool>,
-    sd: Option<f64>,
-}
-
-/// A draw of N(0, G) from any positive semidefinite G, by a Cholesky decomposition that leaves out what has no power.
-fn shaken(gram: &[f64], size: usize, random: &mut Random) -> Vec<f64> {
-    let mut lower = vec![0.0_f64; size * size];
-    for k in 0..size {
-        let row = |a: usize| a * size;
-        let square: f64 = (0..k).map(|j| lower[row(k) + j].powi(2)).sum();
-        let pivot = gram[row(k) + k] - square;
-        if pivot <= 1e-12 * gram[row(k) + k] {
-            continue;
-        }
-        let root = pivot.sqrt();
-        for a in k..size {
-            let product: f64 = (0..k).map(|j| lower[row(a) + j] * lower[row(k) + j]).sum();
-            lower[row(a) + k] = (gram[row(a) + k] - product) / root;
-        }
-    }
-    let normal: Vec<f64> = (0..size).map(|_| random.normal()).collect();
-    let rows = lower.chunks_exact(size.max(1));
-    rows.map(|row| row.iter().zip(&normal).map(|(l, x)| l * x).sum())
         .collect()
 }
 
@@ -542,26 +368,6 @@ mod tests {
         assert!(
             (lambda - (2.0 - 1.0 / 3.0) * 0.49 / 0.25).abs() < 1e-12,
             "{lambda}"
-        );
-    }
-
-    /// Second moments of 20 000 draws within 5 standard errors (false alarm 4e-6 in all, the seed is fixed); the third row is the sum of the
-    /// others.
-    #[test]
-    fn noise_of_rows_has_their_covariance_where_columns_depend_too() {
-        let gram = [2.0, 0.5, 2.5, 0.5, 1.0, 1.5, 2.5, 1.5, 4.0];
-        let mut random = Random::new(3, 0);
-        let draws: Vec<Vec<f64>> = (0..20_000).map(|_| shaken(&gram, 3, &mut random)).collect();
-        for (place, wanted) in gram.iter().enumerate() {
-            let (a, b) = (place / 3, place % 3);
-            let sum: f64 = draws.iter().map(|draw| draw[a] * draw[b]).sum();
-            let error = ((gram[4 * a] * gram[4 * b] + wanted * wanted) / 20_000.0).sqrt();
-            assert!((sum / 20_000.0 - wanted).abs() < 5.0 * error, "{a} {b}");
-        }
-        assert!(
-            draws
-                .iter()
-                .all(|draw| (draw[0] + draw[1] - draw[2]).abs() < 1e-9)
         );
     }
 }

@@ -4,8 +4,8 @@
 //! M = M_new + (rows/T) T_old / n_old · Σ φ φᵀ        over n_old states of logs that last T_old
 //! ```
 
-use super::SPAN;
-use super::information::{Objective, SAMPLES};
+use super::information::Objective;
+use super::spline::{SAMPLES, SPAN};
 use crate::error::{Finding, Result};
 use crate::excitation::States;
 use crate::incidents::{leave_out, motion};

@@ -1,10 +1,11 @@
 //! One chain of local changes to a motion, each within all limits, by the information that it gives.
 
-use super::Task;
 use super::ascent::Climb;
+use super::found::Found;
 use super::information::{Objective, states_of};
 use super::limits::JointLimits;
 use super::spline::{HELD, Spline, steps};
+use super::task::Task;
 use crate::random::Random;
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -20,17 +21,8 @@ const ANEW: usize = 500;
 /// Loss that is accepted with probability 1/e at the start; it falls linearly to 0 at half of the proposals.
 const WARM: f64 = 0.3;
 
-/// Samples of a span, at which distances are looked at; between two of them what moves adds to the margin. Fewer for a random change.
-pub(super) const PER_SPAN: usize = 512;
+/// Samples of a span at which distances are looked at after a random change; between two of them what moves adds to the margin.
 const PER_CHANGE: usize = 256;
-
-/// A motion with what it says.
-#[derive(Debug, Clone)]
-pub(super) struct Found {
-    pub(super) splines: Vec<Spline>,
-    pub(super) sums: Vec<f64>,
-    pub(super) value: f64,
-}
 
 /// One chain of the search.
 pub(super) struct Chain<'a> {
@@ -68,7 +60,7 @@ impl<'a> Chain<'a> {
         Self {
             task,
             objective,
-            bounds: task.limits.iter().map(bounds).collect(),
+            bounds: task.limits.iter().map(JointLimits::bounds).collect(),
             spans,
             rows,
             duration,
@@ -139,7 +131,7 @@ impl<'a> Chain<'a> {
             .task
             .too_close(&splines, (changed, Some(joint)), PER_CHANGE)
         {
-            self.refused = Some(super::motion::in_words(&approach));
+            self.refused = Some(approach.in_words());
             return;
         }
         self.now = Found {
@@ -189,15 +181,4 @@ impl<'a> Chain<'a> {
     fn below(&mut self, count: usize) -> usize {
         ((self.random.uniform() * count as f64) as usize).min(count - 1)
     }
-}
-
-/// Bounds on position, velocity, acceleration and jerk.
-pub(super) fn bounds(limits: &JointLimits) -> [[f64; 2]; 4] {
-    let even = |most: f64| [-most, most];
-    [
-        limits.position,
-        even(limits.velocity),
-        even(limits.acceleration),
-        even(limits.jerk),
-    ]
 }

@@ -10,6 +10,10 @@
 pub(super) const DEGREE: usize = 5;
 /// Control points at either end that stay at the start position.
 pub(super) const HELD: usize = DEGREE;
+/// Samples of a span in the search.
+pub(super) const SAMPLES: usize = 4;
+/// Length of a span, s, where the motion is long enough.
+pub(super) const SPAN: f64 = 0.25;
 
 /// Motion of one joint.
 #[derive(Debug, Clone, PartialEq)]
@@ -69,7 +73,7 @@ pub(super) struct StateWeights {
 impl StateWeights {
     /// At the middle of a sample of the search.
     pub(super) fn of_sample(sample: usize) -> Self {
-        Self::at((sample as f64 + 0.5) / super::information::SAMPLES as f64)
+        Self::at((sample as f64 + 0.5) / SAMPLES as f64)
     }
 
     /// Adds to slopes over the control points of a span what slopes over position, velocity and acceleration are of them.

@@ -1,8 +1,9 @@
 //! Limits hold everywhere, motions repeat, and what is impossible is refused with its cause.
 
 use super::*;
+use crate::robot::Robot;
 use crate::robot::testing::tree;
-use crate::term::{Family, LibrarySettings};
+use crate::term::{Family, Library, LibrarySettings};
 use std::collections::BTreeMap;
 
 pub(super) fn library(robot: &Robot) -> Library {

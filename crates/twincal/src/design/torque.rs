@@ -1,6 +1,5 @@
 //! Torque that a motion needs against the limits of the joints: of the model file, or with the effects that were found.
 
-use super::TorqueLimits;
 use super::limits::JointLimits;
 use super::load::Loaded;
 use crate::error::Result;
@@ -13,6 +12,15 @@ use crate::twin::Twin;
 pub(super) const TORQUE_SHARE: f64 = 0.97;
 /// Half of a central 95 % interval of a normal distribution, in standard deviations.
 const HALF_OF_95: f64 = 1.96;
+
+/// Whether a robot can produce the torque that states ask for.
+pub trait TorqueLimits: Sync {
+    /// |τ| of every joint in every state as a share of what may be used of its limit, `[joint * len + state]`.
+    fn shares(&self, states: &States) -> Vec<f64>;
+
+    /// Name of the joint that has too little torque in some state, with that torque and its limit.
+    fn exceeded(&self, states: &States) -> Option<(String, f64, f64)>;
+}
 
 /// Torque of the model file against the limits of the joints.
 #[derive(Debug)]

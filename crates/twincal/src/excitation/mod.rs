@@ -102,14 +102,15 @@ pub fn excitation(robot: &Robot, library: &Library, gram: &Gram, rows: &States) 
     let columns: Vec<usize> = (0..library.columns().len())
         .filter(|&k| reference.size[k].is_finite() && reference.size[k] > 0.0)
         .collect();
-    let robot_shows = reference.power(library, &columns, &all);
-    let logs_show = reference.power_of_gram(&columns, gram);
+    let power = Power {
+        robot: reference.power(library, &columns, &all),
+        logs: reference.power_of_gram(&columns, gram),
+    };
     let home = |k: usize| library.terms()[library.columns()[columns[k]]].component;
-    let count = library.components().len();
-    let mut own = vec![Vec::new(); count];
+    let mut own = vec![Vec::new(); library.components().len()];
     (0..columns.len()).for_each(|k| own[home(k)].push(k));
 
-    let spectrum = Spectrum::new(&robot_shows, &logs_show, columns.len());
+    let spectrum = Spectrum::new(&power.robot, &power.logs, columns.len());
     // What one more joint would show, in the coordinates of the spectrum.
     let with_joint: Vec<Vec<f64>> = (0..robot.dof())
         .into_par_iter()
@@ -120,55 +121,17 @@ pub fn excitation(robot: &Robot, library: &Library, gram: &Gram, rows: &States) 
         .collect();
 
     let hidden = spectrum.all_hidden();
-    let every: Vec<usize> = (0..robot.dof()).collect();
-    let mut plan = Plan::default();
-    let of_all = shown(&[&hidden], &with_joint);
-    for (joint, shown) in hidden.by_joint(&of_all[0], &every) {
-        plan.steps.push(Step {
-            joint,
-            directions: shown.count(),
-            ..Step::default()
-        });
-    }
+    let mut plan = Plan::of_all(&hidden, &with_joint);
     let allowed: Vec<usize> = plan.steps.iter().filter_map(|step| step.joint).collect();
-
-    let mut components = Vec::with_capacity(count);
-    let mut alone = Directions::empty(spectrum.rank());
-    let part = |columns: &Vec<usize>| {
-        let part = Spectrum::new(
-            &directions::block(&robot_shows, columns),
-            &directions::block(&logs_show, columns),
-            columns.len(),
-        );
-        (part.rank(), part.hidden(columns, &spectrum))
-    };
-    let parts: Vec<(usize, Directions)> = own.iter().map(part).collect();
-    let sets: Vec<&Directions> = parts.iter().map(|(_, hidden)| hidden).collect();
-    let of_parts = shown(&sets, &with_joint);
-    for (index, columns) in own.iter().enumerate() {
-        let (rank, hidden) = &parts[index];
-        let directions = [*rank, rank - hidden.count()];
-        let ratio = columns.iter().map(|&k| {
-            let at = k * spectrum.size() + k;
-            logs_show[at] / robot_shows[at]
-        });
-        let excitation = (ratio.sum::<f64>() / columns.len().max(1) as f64).sqrt();
-        components.push(ComponentExcitation {
-            name: library.components()[index].name.clone(),
-            seen: match directions {
-                [0, _] => Seen::Never,
-                [_, 0] => Seen::NotAtAll,
-                [all, some] if some < all => Seen::Partly,
-                _ => Seen::Fully,
-            },
-            excitation,
-            directions,
-        });
-        for (joint, _) in hidden.by_joint(&of_parts[index], &allowed) {
-            plan.add(joint, index, directions[1] == 0);
-        }
-        alone.join(hidden);
-    }
+    let parts: Vec<Part> = (own.iter())
+        .map(|columns| power.part(columns, &spectrum))
+        .collect();
+    let alone = plan.add_parts(&parts, (&with_joint, &allowed), spectrum.rank());
+    let names = library.components().iter().map(|own| &own.name);
+    let mut components: Vec<ComponentExcitation> = names
+        .zip(&parts)
+        .map(|(name, part)| part.excitation(name))
+        .collect();
     // What is left are directions in which several components cancel.
     let rest = hidden.without(&alone);
     let of_rest = shown(&[&rest], &with_joint);
@@ -178,9 +141,9 @@ pub fn excitation(robot: &Robot, library: &Library, gram: &Gram, rows: &States) 
             .map(|columns| spectrum.torque(&shown, columns))
             .collect();
         let most = torque.iter().fold(0.0_f64, |m, t| m.max(*t));
-        for index in 0..count {
-            if torque[index] > TAKES_PART * most && components[index].directions[1] > 0 {
-                components[index].seen = Seen::Partly;
+        for (index, component) in components.iter_mut().enumerate() {
+            if torque[index] > TAKES_PART * most && component.directions[1] > 0 {
+                component.seen = Seen::Partly;
                 plan.add(joint, index, false);
             }
         }
@@ -189,6 +152,58 @@ pub fn excitation(robot: &Robot, library: &Library, gram: &Gram, rows: &States) 
         directions: [spectrum.rank(), spectrum.rank() - hidden.count()],
         components,
         unseen: plan.finish(robot, library),
+    }
+}
+
+/// S and T, row-major over the columns that are judged.
+struct Power {
+    robot: Vec<f64>,
+    logs: Vec<f64>,
+}
+
+/// The columns of one component by themselves.
+struct Part {
+    /// See [`ComponentExcitation::directions`].
+    directions: [usize; 2],
+    /// See [`ComponentExcitation::excitation`].
+    excitation: f64,
+    /// What the logs do not show of them, in the coordinates of all columns.
+    hidden: Directions,
+}
+
+impl Power {
+    fn part(&self, columns: &Vec<usize>, all: &Spectrum) -> Part {
+        let own = Spectrum::new(
+            &directions::block(&self.robot, columns),
+            &directions::block(&self.logs, columns),
+            columns.len(),
+        );
+        let hidden = own.hidden(columns, all);
+        let ratio = columns.iter().map(|&k| {
+            let at = k * all.size() + k;
+            self.logs[at] / self.robot[at]
+        });
+        Part {
+            directions: [own.rank(), own.rank() - hidden.count()],
+            excitation: (ratio.sum::<f64>() / columns.len().max(1) as f64).sqrt(),
+            hidden,
+        }
+    }
+}
+
+impl Part {
+    fn excitation(&self, name: &str) -> ComponentExcitation {
+        ComponentExcitation {
+            name: name.to_owned(),
+            seen: match self.directions {
+                [0, _] => Seen::Never,
+                [_, 0] => Seen::NotAtAll,
+                [all, some] if some < all => Seen::Partly,
+                _ => Seen::Fully,
+            },
+            excitation: self.excitation,
+            directions: self.directions,
+        }
     }
 }
 
@@ -208,6 +223,40 @@ struct Plan {
 }
 
 impl Plan {
+    /// How many of the hidden directions each joint would show, whatever component they are of.
+    fn of_all(hidden: &Directions, with_joint: &[Vec<f64>]) -> Self {
+        let every: Vec<usize> = (0..with_joint.len()).collect();
+        let of_all = shown(&[hidden], with_joint);
+        let by_joint = hidden.by_joint(&of_all[0], &every).into_iter();
+        let step = |(joint, shown): (Option<usize>, Directions)| Step {
+            joint,
+            directions: shown.count(),
+            ..Step::default()
+        };
+        Self {
+            steps: by_joint.map(step).collect(),
+        }
+    }
+
+    /// Adds what is hidden of each component by itself, and gives all of that.
+    fn add_parts(
+        &mut self,
+        parts: &[Part],
+        (with_joint, allowed): (&[Vec<f64>], &[usize]),
+        rank: usize,
+    ) -> Directions {
+        let sets: Vec<&Directions> = parts.iter().map(|part| &part.hidden).collect();
+        let of_parts = shown(&sets, with_joint);
+        let mut alone = Directions::empty(rank);
+        for (index, part) in parts.iter().enumerate() {
+            for (joint, _) in part.hidden.by_joint(&of_parts[index], allowed) {
+                self.add(joint, index, part.directions[1] == 0);
+            }
+            alone.join(&part.hidden);
+        }
+        alone
+    }
+
     fn add(&mut self, joint: Option<usize>, member: usize, nothing: bool) {
         let known = self.steps.iter().position(|step| step.joint == joint);
         let at = known.unwrap_or_else(|| {

@@ -4,6 +4,7 @@
 mod deviations;
 mod discoveries;
 mod hierarchy;
+mod known;
 mod logs;
 mod noise;
 mod posterior;
@@ -11,35 +12,26 @@ mod result;
 mod sampler;
 mod scatter;
 mod twins;
+mod windows;
 
 pub use logs::{LeftOut, Reason};
 pub use result::{
-    CoursePoint, DeviationSummary, FleetResult, TypeEffect, UnitSummary, Value, WindowSpan,
+    CoursePoint, DeviationSummary, FleetResult, FleetTwin, TypeEffect, UnitSummary, Value,
 };
-pub use twins::FleetTwin;
+pub use windows::WindowSpan;
 
 use crate::calibrate::{CalibrationSettings, Statistics};
 use crate::error::{Error, Result};
-use crate::gram::Gram;
-use crate::likelihood::Columns;
 use crate::posterior::Method;
-use crate::robot::Robot;
-use crate::term::{Family as TermFamily, Library};
-use hierarchy::{Hierarchy, Scatter, UnitSums, Window};
+use known::Known;
 use logs::{Family, KeptLog, KeptStatistics};
-use noise::Noise;
 use posterior::Length;
 use std::collections::BTreeSet;
 use twins::Twins;
+use windows::{FleetUnit, number, spans};
 
 /// Robots in which noise is measured: so many to twice as many, evenly in the order of their files.
 const MEASURED: usize = 5;
-/// Factor on the probability of a deviation in what seldom changes on a robot in service, and in the body of a link.
-const SELDOM: f64 = 0.1;
-const BODY: f64 = 1e-3;
-/// 5 January 1970 was a Monday: windows of a week begin on Mondays, s.
-const MONDAY: f64 = 4.0 * 86_400.0;
-
 /// How a fleet is looked at.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FleetSettings {
@@ -265,13 +257,6 @@ fn no_units(units: usize, left_out: &[LeftOut]) -> Error {
     }
 }
 
-/// The logs of one unit, by window.
-#[derive(Debug)]
-struct FleetUnit {
-    name: String,
-    logs: Vec<KeptLog>,
-}
-
 fn by_unit(logs: Vec<KeptLog>) -> Vec<FleetUnit> {
     let mut units: Vec<FleetUnit> = Vec::new();
     for log in logs {
@@ -284,198 +269,6 @@ fn by_unit(logs: Vec<KeptLog>) -> Vec<FleetUnit> {
         }
     }
     units
-}
-
-/// Windows that hold a log of the fleet, in time; logs without a date are in one of their own before all others.
-fn spans(units: &[FleetUnit], window: f64) -> Vec<WindowSpan> {
-    let logs = units.iter().flat_map(|unit| &unit.logs);
-    let mut numbers: Vec<Option<i64>> = logs.map(|log| number(log, window)).collect();
-    numbers.sort_unstable();
-    numbers.dedup();
-    let span = |number: Option<i64>| WindowSpan {
-        number,
-        since: number.map(|n| n as f64 * window + MONDAY),
-    };
-    numbers.into_iter().map(span).collect()
-}
-
-fn number(log: &KeptLog, window: f64) -> Option<i64> {
-    let start = log.since_1970()?;
-    Some(((start - MONDAY) / window).floor() as i64)
-}
-
-/// What is known before the hierarchy: candidates, columns and noise.
-#[derive(Debug)]
-struct Known {
-    library: Library,
-    columns: Columns,
-    noise: Noise,
-    /// Names of the units, with their files.
-    units: Vec<UnitLogs>,
-    /// Zero columns of the library before it.
-    zero: Vec<usize>,
-    factors: Vec<Vec<f64>>,
-}
-
-/// Names of a unit and of its logs.
-#[derive(Debug, Clone)]
-struct UnitLogs {
-    name: String,
-    logs: Vec<String>,
-    rows: usize,
-}
-
-impl Known {
-    fn new(robot: &Robot, units: &[FleetUnit], settings: &CalibrationSettings) -> Result<Self> {
-        let (every_candidate, _) = Library::propose(robot, &settings.library)?;
-        let logs = || units.iter().flat_map(|unit| &unit.logs);
-        let (mut squares, mut rows) = (vec![0.0; every_candidate.columns().len()], 0);
-        for log in logs() {
-            rows += log.rows;
-            for joint in &log.gram.joints {
-                for (i, &column) in joint.columns.iter().enumerate() {
-                    squares[column as usize] += joint.s0.at(i, i);
-                }
-            }
-        }
-        let zero = crate::calibrate::hardly_act(&squares, rows, &every_candidate);
-        let library = every_candidate.without_columns(&zero);
-        let columns = crate::calibrate::columns_of(robot, &library, settings, false)?;
-        let measured: Vec<KeptLog> = logs().filter(|log| log.measured).cloned().collect();
-        let noise = noise::measure(&measured, &zero, &columns, settings)?;
-        let grams: Vec<Gram> = units
-            .iter()
-            .map(|unit| {
-                let mut sum = Gram::default();
-                unit.logs.iter().for_each(|log| sum += &log.gram);
-                sum.drop_columns(&zero);
-                sum
-            })
-            .collect();
-        Ok(Self {
-            factors: noise.of_units(&grams),
-            units: (units.iter())
-                .map(|unit| UnitLogs {
-                    name: unit.name.clone(),
-                    logs: unit.logs.iter().map(|log| log.name.clone()).collect(),
-                    rows: unit.logs.iter().map(|log| log.rows).sum(),
-                })
-                .collect(),
-            library,
-            columns,
-            noise,
-            zero,
-        })
-    }
-
-    /// Sums of every unit and window; the logs are gone with it.
-    fn hierarchy(&self, units: Vec<FleetUnit>, (spans, window): (&[WindowSpan], f64)) -> Hierarchy {
-        use rayon::prelude::*;
-        let sums = units.into_par_iter().zip(&self.factors);
-        let of_unit = |(unit, factor): (FleetUnit, &Vec<f64>)| {
-            let mut windows: Vec<(usize, Gram)> = Vec::new();
-            for log in unit.logs {
-                let own = number(&log, window);
-                let at = spans.partition_point(|span| span.number < own);
-                match windows.iter_mut().find(|(index, _)| *index == at) {
-                    Some((_, sum)) => *sum += &log.gram,
-                    None => windows.push((at, log.gram)),
-                }
-            }
-            windows.sort_by_key(|(index, _)| *index);
-            let window = |(index, mut gram): (usize, Gram)| {
-                gram.drop_columns(&self.zero);
-                let (precision, score) = self.noise.normal_sums(&gram, factor);
-                Window {
-                    index,
-                    precision,
-                    score,
-                }
-            };
-            UnitSums {
-                windows: windows.into_iter().map(window).collect(),
-            }
-        };
-        let units = sums.map(of_unit).collect();
-        let (columns, odds) = self.components();
-        let size = self.columns.names.len();
-        let mut prior = self.noise.prior.clone();
-        prior.slab = vec![1.0; size];
-        prior.lower = vec![f64::NEG_INFINITY; size];
-        prior.halves = Vec::new();
-        Hierarchy {
-            units,
-            prior,
-            plug_in: Scatter {
-                variance: vec![1.0; columns.len()],
-                windows: vec![1.0; columns.len()],
-                share: 0.0,
-            },
-            columns,
-            odds,
-            names: self.columns.names.clone(),
-        }
-    }
-
-    /// Columns of each component, and how readily a unit deviates in it.
-    fn components(&self) -> (Vec<Vec<usize>>, Vec<f64>) {
-        let own = self.groups().into_iter();
-        own.map(|group| {
-            let first = self.columns.component[group.columns[0]];
-            let alias = self.columns.second_choice.get(first).copied();
-            let odds = match alias {
-                Some(true) => 0.0,
-                _ => odds(self.library.terms()[self.library.columns()[group.columns[0]]].family),
-            };
-            (group.columns, odds)
-        })
-        .unzip()
-    }
-
-    /// What is in or out together, with its place in the library: a payload's tensor is apart from its mass.
-    fn groups(&self) -> Vec<Group> {
-        let mut groups: Vec<Group> = Vec::new();
-        for (k, &component) in self.columns.component.iter().enumerate() {
-            if component == groups.len() {
-                groups.push(Group {
-                    index: self.library.terms()[self.library.columns()[k]].component,
-                    columns: Vec::new(),
-                });
-            }
-            groups[component].columns.push(k);
-        }
-        groups
-    }
-}
-
-/// Columns that are in or out together.
-#[derive(Debug, Clone)]
-struct Group {
-    /// Of its component in the library.
-    index: usize,
-    columns: Vec<usize>,
-}
-
-/// What wears, drags, is moved or is put on changes in service; a drive constant or a spring seldom does, and what a link weighs hardly ever. The
-/// shape of a friction law is no cause to name: a motion that shows it badly moves its coefficients far, and its level has a name. What a tensor
-/// adds to a small body is next to nothing.
-fn odds(family: TermFamily) -> f64 {
-    match family {
-        TermFamily::Viscous
-        | TermFamily::Coulomb
-        | TermFamily::Payload
-        | TermFamily::EncoderZero
-        | TermFamily::Offset
-        | TermFamily::Tilt => 1.0,
-        TermFamily::PayloadTensor
-        | TermFamily::Potential
-        | TermFamily::CoupledFriction
-        | TermFamily::CoupledInertia
-        | TermFamily::Ripple => 0.0,
-        family if family.is_friction() => 0.0,
-        family if family.is_level() => BODY,
-        _ => SELDOM,
-    }
 }
 
 #[cfg(test)]

@@ -1,12 +1,12 @@
 //! What a fleet's posterior says in physical words: effects of the type, and the units that deviate.
 
-use super::Known;
 use super::deviations::Deviation;
 use super::discoveries::named;
 use super::hierarchy::{Hierarchy, dot};
+use super::known::Known;
 use super::logs::LeftOut;
 use super::posterior::{FleetPosterior, UnitPosterior};
-use super::twins::FleetTwin;
+use super::windows::WindowSpan;
 use crate::calibrate::Calibration;
 use crate::term::{Family, Library};
 
@@ -16,15 +16,6 @@ const LISTED: f64 = 0.1;
 const LISTED_TYPE: f64 = 0.01;
 /// Draws of a deviation that an interval needs.
 const ENOUGH: usize = 20;
-
-/// One window of a fleet.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct WindowSpan {
-    /// Windows since the first Monday of 1970; `None` for logs without a date.
-    pub number: Option<i64>,
-    /// Start since 1970, s; `None` for logs without a date.
-    pub since: Option<f64>,
-}
 
 /// A number with its central 95 % interval.
 #[derive(Debug, Clone, PartialEq)]
@@ -111,6 +102,15 @@ pub struct UnitSummary {
     pub mean: Vec<f64>,
     /// sd of β likewise.
     pub sd: Vec<f64>,
+}
+
+/// A robot of the fleet as a calibrated twin.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FleetTwin {
+    /// Name of the robot.
+    pub robot: String,
+    /// Its twin: the coefficients of its last window, given the statistics of all robots.
+    pub calibration: Calibration,
 }
 
 /// The posterior of a fleet.

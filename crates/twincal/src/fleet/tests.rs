@@ -100,36 +100,78 @@ fn states() -> Vec<(Option<(usize, usize)>, f64)> {
     all
 }
 
-/// Every combination of states of some components over some units, by digits.
-fn enumerate(hierarchy: &Hierarchy, deviating: usize) -> Truth {
-    let units = hierarchy.units.len();
-    let states = states();
-    let digits = units * deviating;
-    let combinations = states.len().pow(digits as u32);
-    // z_ut = L⁻¹ η with Λ = L Lᵀ is Lᵀβ with unit noise.
-    let roots: Vec<(Vec<f64>, Vec<f64>)> = (hierarchy.units.iter())
-        .flat_map(|unit| &unit.windows)
-        .map(|window| {
+/// Everything that is added up: each model of the type with each combination of states of some components over some units.
+struct Enumeration<'a> {
+    hierarchy: &'a Hierarchy,
+    /// Components that may deviate.
+    deviating: usize,
+    states: Vec<(Option<(usize, usize)>, f64)>,
+    /// L of every unit and window, with Λ = L Lᵀ: z_ut = L⁻¹ η is Lᵀβ with unit noise.
+    roots: Vec<Vec<f64>>,
+    /// All z_ut, one after the other.
+    z: Vec<f64>,
+}
+
+/// One model with one combination of states: ln of its density times its prior, and E[μ].
+struct Weighed {
+    model: usize,
+    combination: usize,
+    log: f64,
+    mu: Vec<f64>,
+}
+
+impl<'a> Enumeration<'a> {
+    fn new(hierarchy: &'a Hierarchy, deviating: usize) -> Self {
+        let windows = hierarchy.units.iter().flat_map(|unit| &unit.windows);
+        let whitened = |window: &Window| {
             let factor = Cholesky::new(&window.precision, COLUMNS).unwrap();
             let mut z = window.score.clone();
             factor.solve_lower(&mut z);
             (factor.lower().to_vec(), z)
+        };
+        let (roots, z): (Vec<Vec<f64>>, Vec<Vec<f64>>) = windows.map(whitened).unzip();
+        Self {
+            hierarchy,
+            deviating,
+            states: states(),
+            roots,
+            z: z.concat(),
+        }
+    }
+
+    /// States of a combination, by digits: unit, component, state and its prior.
+    fn digits(
+        &self,
+        combination: usize,
+    ) -> impl Iterator<Item = (usize, usize, Option<(usize, usize)>, f64)> {
+        let mut left = combination;
+        (0..self.hierarchy.units.len() * self.deviating).map(move |digit| {
+            let (state, prior) = self.states[left % self.states.len()];
+            left /= self.states.len();
+            (digit / self.deviating, digit % self.deviating, state, prior)
         })
-        .collect();
-    let z: Vec<f64> = roots.iter().flat_map(|(_, z)| z.clone()).collect();
-    let size = z.len();
-    let cells = units * WINDOWS;
-    // Covariance of β over all units and windows, times Lᵀ from both sides, for a variance v[k] shared between two cells.
-    let spread = |matrix: &mut [f64], a: usize, b: usize, k: usize, variance: f64| {
-        let row = |cell: usize| &roots[cell].0[k * COLUMNS..(k + 1) * COLUMNS];
+    }
+
+    /// Row k of L of a cell, a unit in a window.
+    fn row(&self, cell: usize, k: usize) -> &[f64] {
+        &self.roots[cell][k * COLUMNS..(k + 1) * COLUMNS]
+    }
+
+    /// Adds to the covariance of z a variance of β_k that two cells share.
+    fn spread(&self, matrix: &mut [f64], [a, b]: [usize; 2], k: usize, variance: f64) {
+        let size = self.z.len();
         for i in 0..=k {
             for j in 0..=k {
                 matrix[(a * COLUMNS + i) * size + b * COLUMNS + j] +=
-                    variance * row(a)[i] * row(b)[j];
+                    variance * self.row(a, k)[i] * self.row(b, k)[j];
             }
         }
-    };
-    let weigh = |model: usize, combination: usize| -> (f64, Vec<f64>) {
+    }
+
+    /// Covariance of z with the coefficients of one model of the type, and ln of its prior.
+    fn of_type(&self, model: usize) -> (Vec<f64>, f64) {
+        let (size, cells) = (self.z.len(), self.roots.len());
+        let plug_in = &self.hierarchy.plug_in;
         let mut matrix = vec![0.0; size * size];
         (0..size).for_each(|i| matrix[i * size + i] = 1.0);
         let mut log = 0.0;
@@ -140,63 +182,79 @@ fn enumerate(hierarchy: &Hierarchy, deviating: usize) -> Truth {
                 for b in 0..cells {
                     let mut variance = f64::from(u8::from(inside));
                     if a / WINDOWS == b / WINDOWS {
-                        variance += hierarchy.plug_in.variance[k];
+                        variance += plug_in.variance[k];
                     }
                     if a == b {
-                        variance += hierarchy.plug_in.windows[k];
+                        variance += plug_in.windows[k];
                     }
-                    spread(&mut matrix, a, b, k, variance);
+                    self.spread(&mut matrix, [a, b], k, variance);
                 }
             }
         }
-        let mut left = combination;
-        for digit in 0..digits {
-            let (state, prior) = states[left % states.len()];
-            left /= states.len();
+        (matrix, log)
+    }
+
+    fn weigh(&self, model: usize, combination: usize) -> Weighed {
+        let (mut matrix, mut log) = self.of_type(model);
+        for (unit, k, state, prior) in self.digits(combination) {
             log += prior.ln();
             let Some((start, scale)) = state else {
                 continue;
             };
-            let (unit, k) = (digit / deviating, digit % deviating);
+            let cell = |window: usize| unit * WINDOWS + window;
             for a in start..WINDOWS {
                 for b in start..WINDOWS {
-                    let cell = |window: usize| unit * WINDOWS + window;
-                    spread(&mut matrix, cell(a), cell(b), k, SCALES[scale]);
+                    self.spread(&mut matrix, [cell(a), cell(b)], k, SCALES[scale]);
                 }
             }
         }
-        let factor = Cholesky::new(&matrix, size).unwrap();
-        let mut half = z.clone();
+        let factor = Cholesky::new(&matrix, self.z.len()).unwrap();
+        let mut half = self.z.clone();
         factor.solve_lower(&mut half);
         log -= 0.5 * (factor.log_determinant() + dot(&half, &half));
         factor.solve_upper(&mut half);
         // E[μ_k] = Σ over cells of the row of L times the solved data.
-        let mean = (0..COLUMNS).map(|k| {
+        let mu = (0..COLUMNS).map(|k| {
             let inside = f64::from(u8::from(model >> k & 1 == 1));
-            let own = |cell: usize| {
-                dot(
-                    &roots[cell].0[k * COLUMNS..(k + 1) * COLUMNS],
-                    &half[cell * COLUMNS..(cell + 1) * COLUMNS],
-                )
-            };
-            inside * (0..cells).map(own).sum::<f64>()
+            let solved = half.chunks_exact(COLUMNS).enumerate();
+            inside
+                * solved
+                    .map(|(cell, half)| dot(self.row(cell, k), half))
+                    .sum::<f64>()
         });
-        (log, mean.collect())
-    };
-    let models = 1 << COLUMNS;
-    let all: Vec<(usize, usize, f64, Vec<f64>)> = (0..models * combinations)
-        .into_par_iter()
-        .map(|at| {
-            let (model, combination) = (at % models, at / models);
-            let (log, mean) = weigh(model, combination);
-            (model, combination, log, mean)
-        })
-        .collect();
+        Weighed {
+            model,
+            combination,
+            log,
+            mu: mu.collect(),
+        }
+    }
+
+    /// All models with all combinations.
+    fn weighed(&self) -> Vec<Weighed> {
+        let models = 1 << COLUMNS;
+        let digits = self.hierarchy.units.len() * self.deviating;
+        let combinations = self.states.len().pow(digits as u32);
+        (0..models * combinations)
+            .into_par_iter()
+            .map(|at| self.weigh(at % models, at / models))
+            .collect()
+    }
+}
+
+/// Probabilities over all that is enumerated.
+fn enumerate(hierarchy: &Hierarchy, deviating: usize) -> Truth {
+    let enumeration = Enumeration::new(hierarchy, deviating);
+    let all = enumeration.weighed();
+    let units = hierarchy.units.len();
     let largest = all
         .iter()
-        .map(|own| own.2)
+        .map(|weighed| weighed.log)
         .fold(f64::NEG_INFINITY, f64::max);
-    let total: f64 = all.iter().map(|own| (own.2 - largest).exp()).sum();
+    let total: f64 = all
+        .iter()
+        .map(|weighed| (weighed.log - largest).exp())
+        .sum();
     let mut truth = Truth {
         inclusion: vec![0.0; COLUMNS],
         deviates: vec![vec![0.0; deviating]; units],
@@ -204,19 +262,15 @@ fn enumerate(hierarchy: &Hierarchy, deviating: usize) -> Truth {
         any: vec![0.0; units],
         mu: vec![0.0; COLUMNS],
     };
-    for (model, combination, log, mean) in &all {
-        let weight = (log - largest).exp() / total;
+    for weighed in &all {
+        let weight = (weighed.log - largest).exp() / total;
         for k in 0..COLUMNS {
-            truth.inclusion[k] += weight * f64::from(u8::from(model >> k & 1 == 1));
-            truth.mu[k] += weight * mean[k];
+            truth.inclusion[k] += weight * f64::from(u8::from(weighed.model >> k & 1 == 1));
+            truth.mu[k] += weight * weighed.mu[k];
         }
-        let mut left = *combination;
         let mut any = vec![false; units];
-        for digit in 0..digits {
-            let (state, _) = states[left % states.len()];
-            left /= states.len();
+        for (unit, k, state, _) in enumeration.digits(weighed.combination) {
             if let Some((start, _)) = state {
-                let (unit, k) = (digit / deviating, digit % deviating);
                 any[unit] = true;
                 truth.deviates[unit][k] += weight;
                 truth.late[unit][k] += weight * start as f64;

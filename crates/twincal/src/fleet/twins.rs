@@ -1,10 +1,10 @@
 //! Twins that a fleet gives: that of the type, and those of robots that were asked for.
 
-use super::Known;
 use super::hierarchy::Hierarchy;
+use super::known::Known;
 use super::logs::KeptStatistics;
 use super::posterior::{FleetPosterior, UnitPosterior};
-use super::result::FleetResult;
+use super::result::{FleetResult, FleetTwin};
 use crate::calibrate::{
     Calibration, CalibrationSettings, Plan, Pooled, Statistics, calibrate_pooled,
 };
@@ -16,15 +16,6 @@ use crate::robot::Robot;
 const LEAST: f64 = 1e-10;
 /// Probability of a change from which the logs before it are no longer the robot's.
 const CHANGED: f64 = 0.5;
-
-/// A robot of the fleet as a calibrated twin.
-#[derive(Debug, Clone, PartialEq)]
-pub struct FleetTwin {
-    /// Name of the robot.
-    pub robot: String,
-    /// Its twin: the coefficients of its last window, given the statistics of all robots.
-    pub calibration: Calibration,
-}
 
 /// What twins are made of.
 pub(super) struct Twins<'a> {

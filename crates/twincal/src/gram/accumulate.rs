@@ -1,7 +1,8 @@
 //! From rows to statistics: whole blocks are multiplied where they are, single rows wait until they are a block.
 
-use super::block::{BLOCK, Block, Columns, Differences, Rows, Workspace};
+use super::block::{Block, Columns, Differences, Rows, Workspace};
 use super::products::Products;
+use super::tiles::BLOCK;
 use super::{JointGram, Symmetric};
 use crate::term::Recipes;
 use pulp::{Simd, WithSimd};

@@ -6,19 +6,9 @@
 //! one of their differences, as it was before: 65 % of the peak for the parts of a Panda from the cache, 72 % now.)
 
 use super::products::{Products, Tile, first_tile};
-use super::tiles::{Samples, Steps, rectangle, triangle, triangle_and_steps};
+use super::tiles::{BLOCK, Column, Head, Samples, Steps, rectangle, triangle, triangle_and_steps};
 use crate::lanes::{Aligned, LANES};
 use pulp::Simd;
-
-/// Samples per block: enough that what a tile costs once does not count, few enough that a tile's columns and their differences stay in
-/// the first-level cache (25 of 32 KiB) while others come by, and a block's signals of all joints in the second (256 instead: 2 % slower).
-pub(super) const BLOCK: usize = 320;
-
-/// A column's samples.
-pub(super) type Column = [f64; BLOCK];
-
-/// Differences of a column's first samples, from each other and from what stands before the block.
-pub(super) type Head = [f64; LANES];
 
 /// Working memory of [`JointAccumulator::push_block`](super::JointAccumulator::push_block): that of all joints one after the
 /// other, so that it stays in the cache. Holds nothing between calls.

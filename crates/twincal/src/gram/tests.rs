@@ -209,7 +209,7 @@ fn instruction_sets_agree() {
 fn whole_blocks_equal_single_rows() {
     let log = Log::new(11, 7, 1000, false);
     assert_eq!(log.gram(1000), log.gram(1));
-    assert_eq!(log.gram(super::block::BLOCK), log.gram(100));
+    assert_eq!(log.gram(super::tiles::BLOCK), log.gram(100));
 }
 
 /// Columns in the same places of a page are copied before they are multiplied; others are read where they are.

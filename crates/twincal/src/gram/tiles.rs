@@ -1,8 +1,17 @@
 //! Inner products of a few columns with a few others: sums that stay in registers while a block of samples comes by.
 
-use super::block::{BLOCK, Column, Head};
 use crate::lanes::LANES;
 use pulp::Simd;
+
+/// Samples per block: enough that what a tile costs once does not count, few enough that a tile's columns and their differences stay in
+/// the first-level cache (25 of 32 KiB) while others come by, and a block's signals of all joints in the second (256 instead: 2 % slower).
+pub(super) const BLOCK: usize = 320;
+
+/// A column's samples.
+pub(super) type Column = [f64; BLOCK];
+
+/// Differences of a column's first samples, from each other and from what stands before the block.
+pub(super) type Head = [f64; LANES];
 
 /// Columns, a vector of samples of each at a time.
 pub(super) trait Vectors<const N: usize>: Copy {

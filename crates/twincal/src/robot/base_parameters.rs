@@ -2,13 +2,11 @@
 
 use super::Robot;
 use super::block::BLOCK;
-use super::dynamics::Motion;
+use super::motion::Motion;
 use super::parameters::{PARAMETERS, to_body_frame};
+use super::random_states::random_states;
 use super::regressor::Regressor;
 use crate::linear_algebra::dot;
-use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
-use std::f64::consts::PI;
 
 /// Random states that the analysis looks at. A body has ten parameters and at least one joint's torque, so ten states
 /// are enough for almost every draw; three times as many keep the columns well apart.
@@ -199,15 +197,4 @@ fn link_columns(robot: &Robot) -> Vec<Vec<f64>> {
         }
     }
     columns
-}
-
-/// Positions anywhere, velocities and accelerations such that gravity, acceleration and velocity matter alike; always
-/// the same ones. Layout of [`Motion`].
-pub(crate) fn random_states(robot: &Robot, len: usize) -> [Vec<f64>; 3] {
-    let mut random = ChaCha8Rng::seed_from_u64(1);
-    [PI, 2.0, 5.0].map(|scale| {
-        (0..robot.dof() * len)
-            .map(|_| scale * (2.0 * random.random::<f64>() - 1.0))
-            .collect()
-    })
 }

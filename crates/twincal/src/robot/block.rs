@@ -2,8 +2,8 @@
 
 use super::Robot;
 use super::bodies::Body;
-use super::dynamics::Motion;
 use super::lane_vectors::{load, load_any, store};
+use super::motion::Motion;
 use super::recursion::State;
 use crate::lanes::{LANES, Line, sin_cos_fused};
 use pulp::Simd;

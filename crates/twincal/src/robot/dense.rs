@@ -30,7 +30,8 @@ pub(super) fn report(
         let (mass, link) = (body.moments.mass, &description.links[body.link].name);
         // An impossible tensor has no radius.
         let told = |finding: &Finding| {
-            [CODE, Code::UnphysicalInertia].contains(&finding.code) && finding.subject == *link
+            [Code::PointMass, Code::UnphysicalInertia].contains(&finding.code)
+                && finding.subject == *link
         };
         if mass <= WORTH_TELLING * all || findings.iter().any(told) {
             continue;
@@ -60,12 +61,15 @@ pub(super) fn report(
             significant(1e3 * radius, 2),
             significant(1e3 * (0.4_f64).sqrt() * ball, 2)
         );
-        findings.push(Finding::new(Severity::Note, CODE, link, message, 1));
+        findings.push(Finding::new(
+            Severity::Note,
+            Code::PointMass,
+            link,
+            message,
+            1,
+        ));
     }
 }
-
-/// The same of links without any tensor.
-pub(super) const CODE: Code = Code::PointMass;
 
 #[cfg(test)]
 mod tests {
@@ -105,7 +109,7 @@ mod tests {
             ],
         };
         let (_, findings) = Robot::new(description, &BTreeMap::new()).unwrap();
-        let points = findings.iter().filter(|f| f.code == super::CODE);
+        let points = findings.iter().filter(|f| f.code == super::Code::PointMass);
         points.map(|finding| finding.message.clone()).collect()
     }
 

@@ -3,10 +3,10 @@
 use super::Robot;
 use super::block::{BlockWorkspace, Group, Registers, STRIDE, add_to, run};
 use super::bodies::Body;
-use super::dynamics::Motion;
 use super::lane_vectors::{
     V3, cross_add, dot, dot_add, origin, splat, to_child, to_parent, to_parent_add, turn, turn_back,
 };
+use super::motion::Motion;
 use super::recursion::{State, newton_euler};
 use pulp::Simd;
 use std::ops::Range;

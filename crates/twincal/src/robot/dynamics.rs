@@ -3,6 +3,7 @@
 use super::Robot;
 use super::block::{Angles, BLOCK, Instructions};
 use super::lane_vectors::{load, store};
+use super::motion::Motion;
 use super::recursion::{State, newton_euler};
 use pulp::{Scalar, Simd};
 
@@ -19,19 +20,6 @@ impl Workspace {
             states: vec![State::new(0.0); robot.bodies.len()],
         }
     }
-}
-
-/// Motion of `len` samples in structure-of-arrays form: `q[joint * len + sample]`. SI units.
-#[derive(Debug, Clone, Copy)]
-pub struct Motion<'a> {
-    /// Number of samples.
-    pub len: usize,
-    /// Positions, dof × len, rad or m.
-    pub q: &'a [f64],
-    /// Velocities, dof × len.
-    pub qd: &'a [f64],
-    /// Accelerations, dof × len.
-    pub qdd: &'a [f64],
 }
 
 /// Nominal torque of one sample, by the recursive Newton–Euler equations.

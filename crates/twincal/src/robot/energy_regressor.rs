@@ -4,8 +4,8 @@
 
 use super::Robot;
 use super::block::{BlockWorkspace, Group, Registers, STRIDE, add_to, run};
-use super::dynamics::Motion;
 use super::lane_vectors::{cross, cross_add, dot, dot_add, origin, splat, to_child, turn_back};
+use super::motion::Motion;
 use super::parameters::ENTRIES;
 use super::recursion::State;
 use pulp::Simd;

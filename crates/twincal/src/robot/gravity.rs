@@ -2,8 +2,8 @@
 
 use super::Robot;
 use super::block::{BlockWorkspace, Group, Registers, STRIDE, add_to, run};
-use super::dynamics::Motion;
 use super::lane_vectors::{origin, splat, to_child, to_parent_add, turn, turn_back};
+use super::motion::Motion;
 use super::recursion::State;
 use pulp::Simd;
 use std::ops::Range;

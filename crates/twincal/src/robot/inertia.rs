@@ -97,61 +97,24 @@ pub(crate) fn check(
     inertia: &Inertia,
     allow_unphysical: bool,
 ) -> Result<Option<Finding>> {
-    let refuse = |problem: String, remedy: &str| {
-        Err(Error::Model {
-            culprit: format!("link `{link}`"),
-            problem,
-            remedy: remedy.into(),
-        })
-    };
-    let Inertia { mass, com, tensor } = inertia;
+    let Inertia { mass, tensor, .. } = inertia;
     let zero_tensor = tensor.as_flattened().iter().all(|&v| v == 0.0);
     let hollow = *mass == 0.0 && !zero_tensor;
     if !mass.is_finite() || *mass < 0.0 || (hollow && !allow_unphysical) {
         return refuse(
+            link,
             format!("mass is {mass} kg"),
             "give it a positive mass (0 only for a link without any inertia)",
         );
     }
-    if !com.iter().all(|v| v.is_finite()) {
-        return refuse(
-            format!("centre of mass is {com:?}"),
-            "give three finite numbers in m",
-        );
-    }
-    if !tensor.as_flattened().iter().all(|v| v.is_finite()) {
-        return refuse(
-            format!("inertia tensor is {tensor:?}"),
-            "give six finite numbers in kg·m²",
-        );
-    }
-    let numbers = [(mass, "mass", "kg")].into_iter();
-    let numbers = numbers.chain(com.iter().map(|v| (v, "centre of mass", "m")));
-    let tensor_entries = tensor.as_flattened().iter();
-    let mut numbers =
-        numbers.chain(tensor_entries.map(|v| (v, "an entry of the inertia tensor", "kg·m²")));
-    if let Some((value, what, unit)) = numbers.find(|(v, ..)| v.abs() > LARGEST) {
-        return refuse(
-            format!("{what} is {value:e} {unit}, the limit is {LARGEST:e}"),
-            "correct the number or its unit",
-        );
-    }
-    for (i, j) in [(0, 1), (0, 2), (1, 2)] {
-        let (a, b) = (tensor[i][j], tensor[j][i]);
-        if (a - b).abs() > TOLERANCE * (tensor[i][i].abs() + tensor[j][j].abs()) {
-            return refuse(
-                format!("inertia tensor is not symmetric ({a} and {b})"),
-                "make it symmetric",
-            );
-        }
-    }
+    check_numbers(link, inertia)?;
     if *mass == 0.0 && zero_tensor {
         return Ok(None);
     }
     if zero_tensor {
         return Ok(Some(Finding::new(
             Severity::Note,
-            super::dense::CODE,
+            Code::PointMass,
             link,
             format!(
                 "link `{link}`: {mass} kg with inertia tensor 0: taken as a point mass. What its real tensor adds will be reported as motor inertia \
@@ -160,22 +123,12 @@ pub(crate) fn check(
             1,
         )));
     }
-    let ([i1, i2, i3], _) = principal_axes(tensor);
-    let problem = if hollow {
-        format!("it has an inertia tensor (up to {i3:.4e} kg·m²) but no mass")
-    } else if i1 < -TOLERANCE * i3.abs() || i3 <= 0.0 {
-        format!(
-            "inertia tensor is not positive definite (principal moments {i1:.4e}, {i2:.4e}, {i3:.4e} kg·m²)"
-        )
-    } else if i3 > (i1 + i2) * (1.0 + TOLERANCE) + TOLERANCE * i3 {
-        format!(
-            "inertia tensor breaks the triangle inequality: principal moment {i3:.4e} is more than {i1:.4e} + {i2:.4e} kg·m²"
-        )
-    } else {
+    let Some(problem) = impossible(tensor, hollow) else {
         return Ok(None);
     };
     if !allow_unphysical {
         return refuse(
+            link,
             problem,
             "no body has such an inertia: correct the model (tensor about the centre of mass, axes of its own frame), \
              or go on with a warning by allow = [\"unphysical_inertia\"]",
@@ -190,6 +143,75 @@ pub(crate) fn check(
         message,
         1,
     )))
+}
+
+fn refuse<T>(link: &str, problem: String, remedy: &str) -> Result<T> {
+    Err(Error::Model {
+        culprit: format!("link `{link}`"),
+        problem,
+        remedy: remedy.into(),
+    })
+}
+
+/// Numbers are finite and within [`LARGEST`], and the tensor is symmetric.
+fn check_numbers(link: &str, inertia: &Inertia) -> Result<()> {
+    let Inertia { mass, com, tensor } = inertia;
+    if !com.iter().all(|v| v.is_finite()) {
+        return refuse(
+            link,
+            format!("centre of mass is {com:?}"),
+            "give three finite numbers in m",
+        );
+    }
+    if !tensor.as_flattened().iter().all(|v| v.is_finite()) {
+        return refuse(
+            link,
+            format!("inertia tensor is {tensor:?}"),
+            "give six finite numbers in kg·m²",
+        );
+    }
+    let numbers = [(mass, "mass", "kg")].into_iter();
+    let numbers = numbers.chain(com.iter().map(|v| (v, "centre of mass", "m")));
+    let tensor_entries = tensor.as_flattened().iter();
+    let mut numbers =
+        numbers.chain(tensor_entries.map(|v| (v, "an entry of the inertia tensor", "kg·m²")));
+    if let Some((value, what, unit)) = numbers.find(|(v, ..)| v.abs() > LARGEST) {
+        return refuse(
+            link,
+            format!("{what} is {value:e} {unit}, the limit is {LARGEST:e}"),
+            "correct the number or its unit",
+        );
+    }
+    for (i, j) in [(0, 1), (0, 2), (1, 2)] {
+        let (a, b) = (tensor[i][j], tensor[j][i]);
+        if (a - b).abs() > TOLERANCE * (tensor[i][i].abs() + tensor[j][j].abs()) {
+            return refuse(
+                link,
+                format!("inertia tensor is not symmetric ({a} and {b})"),
+                "make it symmetric",
+            );
+        }
+    }
+    Ok(())
+}
+
+/// Why no body has such a tensor about its centre of mass; `hollow`: it has no mass.
+fn impossible(tensor: &Matrix, hollow: bool) -> Option<String> {
+    let ([i1, i2, i3], _) = principal_axes(tensor);
+    let problem = if hollow {
+        format!("it has an inertia tensor (up to {i3:.4e} kg·m²) but no mass")
+    } else if i1 < -TOLERANCE * i3.abs() || i3 <= 0.0 {
+        format!(
+            "inertia tensor is not positive definite (principal moments {i1:.4e}, {i2:.4e}, {i3:.4e} kg·m²)"
+        )
+    } else if i3 > (i1 + i2) * (1.0 + TOLERANCE) + TOLERANCE * i3 {
+        format!(
+            "inertia tensor breaks the triangle inequality: principal moment {i3:.4e} is more than {i1:.4e} + {i2:.4e} kg·m²"
+        )
+    } else {
+        return None;
+    };
+    Some(problem)
 }
 
 #[cfg(test)]

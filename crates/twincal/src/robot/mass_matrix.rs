@@ -2,7 +2,7 @@
 
 use super::Robot;
 use super::block::{BlockWorkspace, Group, Registers, STRIDE, add_to, run};
-use super::dynamics::Motion;
+use super::motion::Motion;
 use super::recursion::{State, newton_euler};
 use pulp::Simd;
 use std::ops::Range;

@@ -18,8 +18,10 @@ mod changed;
 mod regrouped;
 mod lane_vectors;
 mod recursion;
-mod dynamics;
+mod motion;
 mod block;
+mod dynamics;
+mod random_states;
 pub mod regressor;
 mod base_parameters;
 mod gravity;
@@ -32,8 +34,6 @@ mod energy;
 #[cfg(test)]
 pub(crate) mod testing;
 
-#[cfg(test)]
-pub(crate) use base_parameters::random_states;
 pub use base_parameters::{BaseParameters, DependentParameter, base_parameters};
 pub use block::{BLOCK, BlockWorkspace, Instructions, STRIDE};
 pub use derivative::position_derivative;
@@ -41,17 +41,18 @@ pub use description::{
     Inertia, JointDescription, JointKind, Limits, LinkDescription, Mimic, Placement,
     RobotDescription,
 };
-pub use dynamics::{
-    Motion, Workspace, inverse_dynamics, mass_matrix, nominal_torque, nominal_torque_with,
-};
+pub use dynamics::{Workspace, inverse_dynamics, mass_matrix, nominal_torque, nominal_torque_with};
 pub use energy::{kinetic_energy, potential_energy};
 pub use energy_regressor::energy_regressor;
 pub use gravity::gravity_regressor;
 pub use inertia::principal_axes;
 pub use mass_matrix::mass_matrices;
+pub use motion::Motion;
 pub use names::{did_you_mean, nearest_names};
 pub use parameters::{PARAMETERS, PINOCCHIO_ORDER, body_parameters, inertia_of, to_body_frame};
 pub use placements::MovingBody;
+#[cfg(test)]
+pub(crate) use random_states::random_states;
 pub use regressor::{Pair, Regressor, RegressorBlock};
 
 use crate::error::{Code, Error, Finding, Result, Severity};

@@ -7,13 +7,13 @@
 //! that vanish whatever the robot does are known beforehand ([`Pair::present`]) and are not computed.
 
 use super::Robot;
-use super::base_parameters::random_states;
 use super::block::{Angles, BLOCK, Instructions, Registers, STRIDE};
-use super::dynamics::Motion;
 use super::lane_vectors::{
     V3, all_to_child, cross, cross_add, dot, dot_add, load, origin, store, turn_back,
 };
+use super::motion::Motion;
 use super::parameters::ENTRIES;
+use super::random_states::random_states;
 use super::recursion::{State, move_body};
 use crate::lanes::{Aligned, LANES, Line};
 use pulp::Simd;

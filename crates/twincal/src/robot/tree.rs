@@ -15,11 +15,15 @@ pub(crate) struct Tree {
 }
 
 fn refuse<T>(culprit: String, problem: impl Into<String>, remedy: impl Into<String>) -> Result<T> {
-    Err(Error::Model {
+    Err(wrong(culprit, problem, remedy))
+}
+
+fn wrong(culprit: String, problem: impl Into<String>, remedy: impl Into<String>) -> Error {
+    Error::Model {
         culprit,
         problem: problem.into(),
         remedy: remedy.into(),
-    })
+    }
 }
 
 /// Index by name; a name used twice is an error.
@@ -48,11 +52,47 @@ fn index<'a>(kind: &str, names: impl Iterator<Item = &'a str>) -> Result<BTreeMa
     Ok(index)
 }
 
+/// Which links joints join, by index.
+struct Joined {
+    /// `(parent, child)` per joint.
+    links: Vec<(usize, usize)>,
+    /// The joint whose child a link is.
+    above: Vec<Option<usize>>,
+    /// The joints whose parent a link is.
+    below: Vec<Vec<usize>>,
+}
+
 /// Checks that links and joints form one tree.
 ///
 /// # Errors
 /// [`Error::Model`] naming the link or joint.
 pub(crate) fn plant(description: &RobotDescription) -> Result<Tree> {
+    let joined = join(description)?;
+    let roots: Vec<usize> = (0..joined.above.len())
+        .filter(|&l| joined.above[l].is_none())
+        .collect();
+    if roots.len() > 1 {
+        return Err(several_roots(description, &joined, &roots));
+    }
+    let (order, reached) = joined.walk(&roots);
+    if let Some(lost) = reached.iter().position(|&r| !r) {
+        return refuse(
+            format!("link `{}`", description.links[lost].name),
+            format!(
+                "is on or behind a cycle of joints: {}",
+                cycle(description, &joined, lost)
+            ),
+            "reverse or remove one of these joints",
+        );
+    }
+    Ok(Tree {
+        order,
+        links: joined.links,
+    })
+}
+
+/// Links by their names; none is the child of two joints.
+fn join(description: &RobotDescription) -> Result<Joined> {
     let joints = &description.joints;
     let by_name = index("link", description.links.iter().map(|l| l.name.as_str()))?;
     index("joint", joints.iter().map(|j| j.name.as_str()))?;
@@ -63,9 +103,11 @@ pub(crate) fn plant(description: &RobotDescription) -> Result<Tree> {
             "define at least a base and one link",
         );
     }
-    let mut links = Vec::with_capacity(joints.len());
-    let mut joint_above: Vec<Option<usize>> = vec![None; by_name.len()];
-    let mut joints_below: Vec<Vec<usize>> = vec![Vec::new(); by_name.len()];
+    let mut joined = Joined {
+        links: Vec::with_capacity(joints.len()),
+        above: vec![None; by_name.len()],
+        below: vec![Vec::new(); by_name.len()],
+    };
     for (j, joint) in joints.iter().enumerate() {
         let find = |role: &str, name: &str| match by_name.get(name) {
             Some(&l) => Ok(l),
@@ -83,7 +125,7 @@ pub(crate) fn plant(description: &RobotDescription) -> Result<Tree> {
                 "parent and child must differ",
             );
         }
-        if let Some(first) = joint_above[child].replace(j) {
+        if let Some(first) = joined.above[child].replace(j) {
             return refuse(
                 format!("link `{}`", joint.child),
                 format!(
@@ -93,81 +135,72 @@ pub(crate) fn plant(description: &RobotDescription) -> Result<Tree> {
                 "open the loop: twincal works on trees",
             );
         }
-        joints_below[parent].push(j);
-        links.push((parent, child));
+        joined.below[parent].push(j);
+        joined.links.push((parent, child));
     }
+    Ok(joined)
+}
 
-    let roots: Vec<usize> = (0..by_name.len())
-        .filter(|&l| joint_above[l].is_none())
-        .collect();
-    let mut order: Vec<usize> = Vec::with_capacity(joints.len());
-    let mut reached = vec![false; by_name.len()];
-    if let [root] = roots[..] {
-        // Breadth first, without recursion: a chain may be very long.
-        reached[root] = true;
-        order.extend(&joints_below[root]);
-        let mut next = 0;
-        while let Some(&j) = order.get(next) {
-            reached[links[j].1] = true;
-            order.extend(&joints_below[links[j].1]);
-            next += 1;
+impl Joined {
+    /// Joints from the root on, parents first, and which links they reach; none where there is no single root.
+    fn walk(&self, roots: &[usize]) -> (Vec<usize>, Vec<bool>) {
+        let mut order: Vec<usize> = Vec::with_capacity(self.links.len());
+        let mut reached = vec![false; self.above.len()];
+        if let [root] = *roots {
+            // Breadth first, without recursion: a chain may be very long.
+            reached[root] = true;
+            order.extend(&self.below[root]);
+            let mut next = 0;
+            while let Some(&j) = order.get(next) {
+                let child = self.links[j].1;
+                reached[child] = true;
+                order.extend(&self.below[child]);
+                next += 1;
+            }
         }
+        (order, reached)
     }
-    if roots.len() > 1 {
-        let names: Vec<String> = roots
-            .iter()
-            .take(4)
-            .map(|&l| format!("`{}`", description.links[l].name))
-            .collect();
-        let lonely = roots.iter().find(|&&l| joints_below[l].is_empty());
-        let problem = format!(
-            "{} links have no parent joint ({}): two roots",
-            roots.len(),
-            names.join(", ")
-        );
-        return match lonely {
-            Some(&l) => refuse(
-                format!("link `{}`", description.links[l].name),
-                format!("is an orphan, no joint names it; {problem}"),
-                "attach it with a fixed joint or remove it",
-            ),
-            None => refuse(
-                format!("robot `{}`", description.name),
-                problem,
-                "attach all but one with fixed joints",
-            ),
-        };
+}
+
+/// More than one link has no parent joint; one that no joint names is the culprit.
+fn several_roots(description: &RobotDescription, joined: &Joined, roots: &[usize]) -> Error {
+    let names: Vec<String> = roots
+        .iter()
+        .take(4)
+        .map(|&l| format!("`{}`", description.links[l].name))
+        .collect();
+    let problem = format!(
+        "{} links have no parent joint ({}): two roots",
+        roots.len(),
+        names.join(", ")
+    );
+    match roots.iter().find(|&&l| joined.below[l].is_empty()) {
+        Some(&l) => wrong(
+            format!("link `{}`", description.links[l].name),
+            format!("is an orphan, no joint names it; {problem}"),
+            "attach it with a fixed joint or remove it",
+        ),
+        None => wrong(
+            format!("robot `{}`", description.name),
+            problem,
+            "attach all but one with fixed joints",
+        ),
     }
-    if let Some(lost) = reached.iter().position(|&r| !r) {
-        return refuse(
-            format!("link `{}`", description.links[lost].name),
-            format!(
-                "is on or behind a cycle of joints: {}",
-                cycle(description, &links, &joint_above, lost)
-            ),
-            "reverse or remove one of these joints",
-        );
-    }
-    Ok(Tree { order, links })
 }
 
 /// The cycle above `link` in words; every link above has a parent, so going up must come round.
-fn cycle(
-    description: &RobotDescription,
-    links: &[(usize, usize)],
-    joint_above: &[Option<usize>],
-    link: usize,
-) -> String {
-    let mut seen = vec![false; joint_above.len()];
+fn cycle(description: &RobotDescription, joined: &Joined, link: usize) -> String {
+    let Joined { links, above, .. } = joined;
+    let mut seen = vec![false; above.len()];
     let mut here = link;
     while !seen[here] {
         seen[here] = true;
-        let Some(j) = joint_above[here] else { break };
+        let Some(j) = above[here] else { break };
         here = links[j].0;
     }
     let start = here;
     let mut names = vec![format!("`{}`", description.links[start].name)];
-    while let Some(j) = joint_above[here] {
+    while let Some(j) = above[here] {
         here = links[j].0;
         if here == start || names.len() >= 6 {
             break;

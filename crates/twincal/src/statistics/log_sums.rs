@@ -1,8 +1,7 @@
 //! What is kept of one log: sums over ten stretches of its rows, of the signals that columns are made of.
 
+use super::bands::Bands;
 use super::decoys::JointDecoys;
-use super::spectrum::Bands;
-use super::sums::Runs;
 use super::weighing::Weighing;
 use crate::gram::{JointAccumulator, JointGram, OpenRun};
 use crate::observations::Part;
@@ -13,6 +12,16 @@ use std::sync::Arc;
 
 /// Stretches of a log, of about the same number of rows.
 pub(crate) const BLOCKS: usize = 10;
+
+/// What is kept of consecutive rows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) enum Runs {
+    /// Nothing: rows are independent, or tempered.
+    #[default]
+    Apart,
+    /// First differences, first and last rows: the likelihood is autoregressive.
+    Joined,
+}
 
 /// Sums over the rows of one log, or of a part of it.
 #[derive(Debug, Clone, PartialEq, Default)]

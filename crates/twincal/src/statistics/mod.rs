@@ -1,21 +1,25 @@
 //! What a fit takes of its rows: sums that add, joint by joint. Up to here cost grows with the logs, and not beyond.
 
+mod bands;
 mod decoys;
 mod log_sums;
 mod spectrum;
 mod sums;
+mod unit;
 mod weighing;
 
+pub(crate) use bands::Bands;
 pub(crate) use decoys::{JointDecoys, decoys};
-pub(crate) use log_sums::{BLOCKS, JointBlock, JointSums, LogSums};
-pub(crate) use spectrum::{Bands, Spectrum};
-pub(crate) use sums::{GROUPS, Purpose, Runs, Sums};
+pub(crate) use log_sums::{BLOCKS, JointBlock, JointSums, LogSums, Runs};
+pub(crate) use spectrum::Spectrum;
+pub(crate) use sums::{GROUPS, Purpose, Sums};
+pub(crate) use unit::{JointUnit, Unit, of_joint, residual_form};
 pub(crate) use weighing::Weighing;
 
-use crate::gram::{Gram, JointGram, Symmetric};
+use crate::gram::Gram;
 use crate::observations::Part;
 use log_sums::stretch;
-use std::ops::{AddAssign, Range};
+use std::ops::Range;
 
 /// Units that one or two logs are cut into; of three logs or more each is one.
 const PARTS: usize = 5;
@@ -27,24 +31,6 @@ const MOST_UNITS: usize = 6;
 pub(crate) struct Training {
     /// Contiguous parts of one or two logs, whole logs or groups of them.
     pub(crate) units: Vec<Unit>,
-}
-
-/// Sums over some rows.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub(crate) struct Unit {
-    /// Columns and torque.
-    pub(crate) gram: Gram,
-    /// What else is asked of each joint.
-    pub(crate) joints: Vec<JointUnit>,
-}
-
-/// Sums over some rows of one joint, beside its [`JointGram`].
-#[derive(Debug, Clone, PartialEq, Default)]
-pub(crate) struct JointUnit {
-    pub(crate) decoys: JointDecoys,
-    /// Squares of the measured torque at all rows, (N·m)².
-    pub(crate) torque: f64,
-    pub(crate) weighing: Weighing,
 }
 
 impl Training {
@@ -79,60 +65,6 @@ impl Training {
             .for_each(|(_, unit)| kept += &unit.gram);
         kept
     }
-}
-
-impl AddAssign<&Unit> for Unit {
-    /// # Panics
-    /// If the two belong to different robots or libraries (an empty default adopts the other's).
-    fn add_assign(&mut self, other: &Unit) {
-        self.gram += &other.gram;
-        if self.joints.is_empty() {
-            self.joints.clone_from(&other.joints);
-            return;
-        }
-        for (sum, own) in self.joints.iter_mut().zip(&other.joints) {
-            sum.decoys += &own.decoys;
-            sum.torque += own.torque;
-            sum.weighing += &own.weighing;
-        }
-    }
-}
-
-impl JointUnit {
-    fn split(sums: JointBlock) -> (JointGram, Self) {
-        let JointBlock {
-            gram,
-            decoys,
-            torque,
-            weighing,
-        } = sums;
-        let rest = Self {
-            decoys,
-            torque,
-            weighing,
-        };
-        (gram, rest)
-    }
-}
-
-/// Coefficients of the columns of a joint.
-pub(crate) fn of_joint(joint: &JointGram, beta: &[f64]) -> Vec<f64> {
-    let columns = joint.columns.iter();
-    columns.map(|&column| beta[column as usize]).collect()
-}
-
-/// `[−β, 1]ᵀ S [−β, 1]`: of Σ x xᵀ the squares of y − Xβ; `beta` belongs to the columns of the joint.
-pub(crate) fn residual_form(sums: &Symmetric, beta: &[f64]) -> f64 {
-    let last = beta.len();
-    let with = |i: usize| -> f64 {
-        let products = beta.iter().enumerate();
-        products.map(|(k, b)| sums.at(i, k) * b).sum()
-    };
-    let terms = beta.iter().enumerate();
-    let explained: f64 = terms
-        .map(|(i, b)| b * (2.0 * sums.at(i, last) - with(i)))
-        .sum();
-    sums.at(last, last) - explained
 }
 
 /// What is left out together, as stretches of groups of logs: three logs or more one by one (more than six in six groups), otherwise one fifth of

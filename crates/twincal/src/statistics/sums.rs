@@ -1,8 +1,8 @@
 //! The sums of all logs of a fit: as many cells as a fit needs to leave some out, however many logs there are.
 
-use super::log_sums::{BLOCKS, JointBlock, LogSums};
+use super::log_sums::{BLOCKS, JointBlock, LogSums, Runs};
 use super::spectrum::Spectrum;
-use super::{JointUnit, Unit};
+use super::unit::{JointUnit, Unit};
 use crate::gram::Gram;
 use crate::observations::Part;
 use crate::term::Recipes;
@@ -71,16 +71,6 @@ impl Keep {
             groups,
         }
     }
-}
-
-/// What is kept of consecutive rows.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) enum Runs {
-    /// Nothing: rows are independent, or tempered.
-    #[default]
-    Apart,
-    /// First differences, first and last rows: the likelihood is autoregressive.
-    Joined,
 }
 
 /// Sums over one stretch of one group of logs.

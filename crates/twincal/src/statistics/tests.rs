@@ -1,6 +1,7 @@
 //! Stretches of a log beside the sums over its rows.
 
 use super::*;
+use crate::gram::Symmetric;
 use crate::observations::{JointObservations, Observations};
 use crate::random::Random;
 use crate::term::Recipes;

@@ -3,10 +3,10 @@
 use super::candidate::Candidate;
 use super::course::anything;
 use super::expression::{Bounded, Graph, Id, Variable, bounded_values};
+use super::motions::Motions;
 use crate::linear_algebra::dot;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
-use std::borrow::Borrow;
 
 /// A column that leaves less than this part of its length outside the span of the columns before it is an alias.
 const TOLERANCE: f64 = 1e-9;
@@ -37,18 +37,6 @@ pub(super) enum Verdict {
     Combination(Vec<(f64, usize)>),
     /// A column, but it exists at too few states where all others do: not compared with them.
     NotCompared,
-}
-
-/// Position, velocity and acceleration of every joint.
-pub(super) type Motions = Vec<[f64; 3]>;
-
-/// Positions, velocities and accelerations of all states, `joint * states + state`.
-pub(super) fn channels<S: Borrow<Motions>>(states: &[S], joints: usize) -> [Vec<f64>; 3] {
-    std::array::from_fn(|k| {
-        (0..joints)
-            .flat_map(|joint| states.iter().map(move |state| state.borrow()[joint][k]))
-            .collect()
-    })
 }
 
 /// Torque of the candidates that are made from the robot model, `(candidate, torque)` with `torque[state * joints + joint]`.
@@ -104,77 +92,13 @@ pub(super) fn judge(
     shares: &dyn Fn(usize) -> bool,
     model: &ModelTorques<'_>,
 ) -> Vec<Verdict> {
-    let wanted = candidates.len() + 32;
-    let entries = Entries::new(candidates);
-    let pool = pool(graph, candidates, &entries, (joints, wanted));
-    let finite = |state: &State, k: usize| state.is_finite(&entries, k);
-
-    let mut verdicts = Vec::with_capacity(candidates.len());
-    for (k, candidate) in candidates.iter_mut().enumerate() {
-        if candidate.model.is_some() {
-            verdicts.push(Verdict::New);
-            continue;
-        }
-        let own: Vec<&State> = pool.iter().filter(|state| finite(state, k)).collect();
-        if own.is_empty() {
-            verdicts.push(Verdict::NeverFinite(pool.len()));
-            continue;
-        }
-        let mut entry = entries.range(k);
-        candidate.image.retain(|_| {
-            let at = entry.next().unwrap_or_default();
-            own.iter().any(|state| !state.torque[at].may_be_zero())
-        });
-        verdicts.push(if candidate.image.is_empty() {
-            Verdict::Null
-        } else {
-            Verdict::New
-        });
-    }
-
-    // states at which all columns exist; the rarest columns stand back until there are enough
+    let pool = Pool::new(graph, candidates, joints);
+    let mut verdicts = pool.by_themselves(candidates);
     let mut live: Vec<usize> = (0..candidates.len())
         .filter(|&k| verdicts[k] == Verdict::New && candidates[k].model.is_none())
         .collect();
-    let usable = loop {
-        let usable: Vec<&State> = pool
-            .iter()
-            .filter(|state| live.iter().all(|&k| finite(state, k)))
-            .collect();
-        let count = |k: usize| pool.iter().filter(|state| finite(state, k)).count();
-        let rarest = live
-            .iter()
-            .copied()
-            .min_by_key(|&k| (count(k), std::cmp::Reverse(k)));
-        match rarest {
-            Some(k) if usable.len() < wanted && count(k) < pool.len() => {
-                verdicts[k] = Verdict::NotCompared;
-                live.retain(|&other| other != k);
-            }
-            _ => break usable,
-        }
-    };
-
-    let usable = &usable[..usable.len().min(wanted)];
-    let mut rows = Sketch::new(usable.len() * joints, candidates.len());
-    for (chunk, states) in usable.chunks(CHUNK).enumerate() {
-        let first = chunk * CHUNK * joints;
-        for &k in &live {
-            let (start, acting) = &entries.of[k];
-            for (state, own) in states.iter().enumerate() {
-                for (joint, entry) in acting.iter().zip(&own.torque[*start..]) {
-                    rows.add(k, first + state * joints + joint, entry.value);
-                }
-            }
-        }
-        let motions: Vec<&Motions> = states.iter().map(|state| &state.motion).collect();
-        for (k, torque) in model(&motions) {
-            for (row, value) in torque.into_iter().enumerate() {
-                rows.add(k, first + row, value);
-            }
-        }
-    }
-    let mut columns = rows.columns;
+    let states = pool.compared(&mut live, &mut verdicts);
+    let mut columns = pool.rows(&states, &live, model).columns;
     columns.sort_by_key(|&(k, _)| (candidates[k].family.preference(), k));
     let (order, columns): (Vec<usize>, Vec<Vec<f64>>) = columns.into_iter().unzip();
     for (position, combination) in dependent(columns) {
@@ -192,6 +116,104 @@ pub(super) fn judge(
         verdicts[k] = Verdict::Combination(combination);
     }
     verdicts
+}
+
+/// Random states, with the torque of all candidates that are expressions.
+struct Pool {
+    states: Vec<State>,
+    entries: Entries,
+    joints: usize,
+    /// States at which columns are compared.
+    wanted: usize,
+}
+
+impl Pool {
+    fn new(graph: &Graph, candidates: &[Candidate], joints: usize) -> Self {
+        let wanted = candidates.len() + 32;
+        let entries = Entries::new(candidates);
+        Self {
+            states: pool(graph, candidates, &entries, (joints, wanted)),
+            entries,
+            joints,
+            wanted,
+        }
+    }
+
+    /// States at which a candidate is a number.
+    fn of(&self, k: usize) -> impl Iterator<Item = &State> {
+        let finite = move |state: &&State| state.is_finite(&self.entries, k);
+        self.states.iter().filter(finite)
+    }
+
+    /// Judges each candidate without the others, and removes the image entries that are zero at every state.
+    fn by_themselves(&self, candidates: &mut [Candidate]) -> Vec<Verdict> {
+        let judged = |(k, candidate): (usize, &mut Candidate)| {
+            if candidate.model.is_some() {
+                return Verdict::New;
+            }
+            let own: Vec<&State> = self.of(k).collect();
+            if own.is_empty() {
+                return Verdict::NeverFinite(self.states.len());
+            }
+            let mut entry = self.entries.range(k);
+            candidate.image.retain(|_| {
+                let at = entry.next().unwrap_or_default();
+                own.iter().any(|state| !state.torque[at].may_be_zero())
+            });
+            match candidate.image.is_empty() {
+                true => Verdict::Null,
+                false => Verdict::New,
+            }
+        };
+        candidates.iter_mut().enumerate().map(judged).collect()
+    }
+
+    /// States at which all columns exist; the rarest columns stand back until there are enough.
+    fn compared(&self, live: &mut Vec<usize>, verdicts: &mut [Verdict]) -> Vec<&State> {
+        loop {
+            let all_exist = |state: &&State| {
+                let mut live = live.iter();
+                live.all(|&k| state.is_finite(&self.entries, k))
+            };
+            let usable: Vec<&State> = self.states.iter().filter(all_exist).collect();
+            let count = |k: usize| self.of(k).count();
+            let rarest = live
+                .iter()
+                .copied()
+                .min_by_key(|&k| (count(k), std::cmp::Reverse(k)));
+            match rarest {
+                Some(k) if usable.len() < self.wanted && count(k) < self.states.len() => {
+                    verdicts[k] = Verdict::NotCompared;
+                    live.retain(|&other| other != k);
+                }
+                _ => return usable.into_iter().take(self.wanted).collect(),
+            }
+        }
+    }
+
+    /// Torque of all columns at some states, row by row.
+    fn rows(&self, states: &[&State], live: &[usize], model: &ModelTorques<'_>) -> Sketch {
+        let joints = self.joints;
+        let mut rows = Sketch::new(states.len() * joints, self.entries.of.len());
+        for (chunk, states) in states.chunks(CHUNK).enumerate() {
+            let first = chunk * CHUNK * joints;
+            for &k in live {
+                let (start, acting) = &self.entries.of[k];
+                for (state, own) in states.iter().enumerate() {
+                    for (joint, entry) in acting.iter().zip(&own.torque[*start..]) {
+                        rows.add(k, first + state * joints + joint, entry.value);
+                    }
+                }
+            }
+            let motions: Vec<&Motions> = states.iter().map(|state| &state.motion).collect();
+            for (k, torque) in model(&motions) {
+                for (row, value) in torque.into_iter().enumerate() {
+                    rows.add(k, first + row, value);
+                }
+            }
+        }
+        rows
+    }
 }
 
 /// Random states, until all candidates exist at `wanted` of them; at most a bounded number where they do not.

@@ -1,9 +1,9 @@
 //! What every family hands to the library: a named candidate with its torque image.
 
 use super::Family;
-use super::directions::Mixture;
 use super::euler_lagrange::euler_lagrange;
 use super::expression::{Function, Graph, Id, Variable};
+use super::mixture::Mixture;
 use super::model_column::ModelColumn;
 
 /// A moving joint as the families see it.

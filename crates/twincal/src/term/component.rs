@@ -1,7 +1,8 @@
 //! A component: one physical story with all its columns, and its coefficients as the parameters that people know.
 
 use super::Family;
-use super::directions::Mixture;
+use super::mixture::Mixture;
+use super::parameter::{Before, Parameter};
 use super::{payload, spring};
 use serde::{Deserialize, Serialize};
 
@@ -27,24 +28,6 @@ impl Component {
     pub fn is_second_choice(&self) -> bool {
         let has_mass = matches!(self.family, Family::Density | Family::MassMoments);
         has_mass && self.alias_of.iter().any(|other| other == payload::NAME)
-    }
-}
-
-/// A physical parameter of a component.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Parameter {
-    /// `mass`, `com_x`, `stiffness`, …
-    pub name: String,
-    /// SI unit.
-    pub unit: String,
-}
-
-impl Parameter {
-    pub(super) fn new(name: &str, unit: &str) -> Self {
-        Self {
-            name: name.into(),
-            unit: unit.into(),
-        }
     }
 }
 
@@ -105,15 +88,4 @@ impl<'a> Meaning<'a> {
             Self::Coefficients | Self::Spring => None,
         }
     }
-}
-
-/// What is known of a parameter before the data.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Before {
-    /// No motion shows it.
-    Hidden,
-    /// Its prior sd.
-    Width(f64),
-    /// It is a ratio and has none.
-    Ratio,
 }

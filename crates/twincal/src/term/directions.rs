@@ -3,13 +3,12 @@
 use super::Family;
 use super::body::Ten;
 use super::candidate::{Candidate, Proposal};
-use super::component::Parameter;
+use super::mixture::{Mixture, product};
 use super::model_column::ModelColumn;
+use super::parameter::Parameter;
 
 /// A direction whose torque at random states is below this part of the largest is hidden from every motion.
 const HIDDEN: f64 = 1e-9;
-/// Share of a parameter's prior variance in hidden directions from which on no motion shows it.
-const SHOWN: f64 = 1e-6;
 /// Lengths of what is left of an axis outside the hidden directions and those before it, that are tried in turn.
 const LEFT: [f64; 4] = [0.5, 0.1, 1e-2, 1e-4];
 /// Rounds of rotations, and the cosine at which two directions are perpendicular.
@@ -124,10 +123,6 @@ fn null_space(directions: &[Ten], torque: &[Vec<f64>]) -> Vec<Vec<f64>> {
     hidden.map(|(turned, _)| turned).collect()
 }
 
-fn product(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
 /// What becomes the columns of one component, or of a part of it.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Columns {
@@ -187,55 +182,6 @@ impl Columns {
             name: name.to_owned(),
             columns,
         }
-    }
-}
-
-/// Parameters that are linear in a component's coefficients.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Mixture {
-    /// Names and units.
-    pub(super) parameters: Vec<Parameter>,
-    /// Per parameter, its change by each coefficient.
-    pub(super) weights: Vec<Vec<f64>>,
-    /// Prior sd of each coefficient.
-    sds: Vec<f64>,
-    /// Per parameter, its prior variance in directions that no column has.
-    lost: Vec<f64>,
-}
-
-impl Mixture {
-    /// `rows`: each parameter's change by the body's ten. `columns`: the change of the ten by each coefficient, and the coefficient's prior
-    /// sd; `hidden`: directions that no column has.
-    pub(super) fn new(
-        parameters: Vec<Parameter>,
-        rows: &[Ten],
-        columns: &[(Ten, f64)],
-        hidden: &[Ten],
-    ) -> Self {
-        let lost = |row: &Ten| hidden.iter().map(|own| product(row, own).powi(2)).sum();
-        Self {
-            weights: (rows.iter())
-                .map(|row| columns.iter().map(|(own, _)| product(row, own)).collect())
-                .collect(),
-            sds: columns.iter().map(|(_, sd)| *sd).collect(),
-            lost: rows.iter().map(lost).collect(),
-            parameters,
-        }
-    }
-
-    /// Prior sd of a parameter where the `live` columns show it; `None` where it also depends on what nothing shows.
-    pub(super) fn prior_sd(&self, parameter: usize, live: &[bool]) -> Option<f64> {
-        let (mut shown, mut lost) = (0.0, self.lost[parameter]);
-        for (k, weight) in self.weights[parameter].iter().enumerate() {
-            let own = (weight * self.sds[k]).powi(2);
-            *(if live[k] { &mut shown } else { &mut lost }) += own;
-        }
-        (lost <= SHOWN * (shown + lost)).then_some(shown.sqrt())
-    }
-
-    /// Values at coefficients `beta`.
-    pub(super) fn values(&self, beta: &[f64]) -> Vec<f64> {
-        self.weights.iter().map(|row| product(row, beta)).collect()
     }
 }
 

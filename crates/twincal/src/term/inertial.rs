@@ -1,10 +1,9 @@
 //! What a robot's bodies may have more than its model says: a payload, and body by body density, first moments and tensor.
 
-use super::aliases::channels;
 use super::body::{Body, bodies};
 use super::candidate::Proposal;
-use super::library::random_motions;
 use super::model_column::{ModelColumn, ModelColumns, Scratch};
+use super::motions::{channels, random_motions};
 use super::payload::{self, Mount};
 use super::{Family, LibrarySettings, density, mass_moments, tensor};
 use crate::error::{Code, Error, Finding, Result, Severity};

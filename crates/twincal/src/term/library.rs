@@ -4,27 +4,26 @@ mod carried;
 mod judged;
 mod linearised;
 
-use super::aliases::{Motions, channels};
 use super::candidate::{Candidate, Joint, Proposal};
-use super::component::{Before, Component, Meaning, Parameter};
+use super::component::{Component, Meaning};
 use super::course::Course;
-use super::directions::Mixture;
 use super::expression::{Graph, Id, Slot, Tape, Variable, bounded_values};
 use super::linearisation::Linearisation;
-use super::model_column::{ModelColumn, ModelColumns};
+use super::mixture::Mixture;
+use super::model_column::{ModelColumn, ModelColumns, Scratch};
+use super::motions::{channels, random_motions};
 use super::overlaps;
+use super::parameter::{Before, Parameter};
 use super::parts::{self, Parts, Torque};
 use super::payload::NAME as PAYLOAD;
 use super::propose::{About, proposals};
 use super::recipes::Recipes;
 use super::sentence::{Estimate, sentence};
+use super::table::Table;
 use super::{Family, LibrarySettings, Status, Term, user};
 use crate::error::{Error, Finding, Result};
 use crate::robot::{JointKind, Motion, Robot};
 use std::sync::Arc;
-
-pub use super::model_column::Scratch;
-pub use super::parts::Table;
 
 /// Ordered terms for one robot, ready to be evaluated. Column k of the regression is the k-th term whose status is
 /// [`Status::Candidate`].
@@ -119,41 +118,14 @@ impl Library {
             .collect();
         graph.forget_derivatives();
         let mut library = Self {
-            terms: Vec::new(),
             components,
-            stories: Vec::new(),
-            prior_sds: Vec::new(),
-            lagrangians: Vec::new(),
-            images: Vec::new(),
-            sources: Vec::new(),
             graph: Arc::new(graph),
-            columns: Vec::new(),
-            by_joint: vec![Vec::new(); joints.len()],
-            tape: Arc::default(),
             model: model.map(Arc::new),
-            parts: Arc::default(),
             payload_frame: settings.payload_frame.clone(),
             mixtures,
-            payload_is_one: false,
-            linearised: None,
+            ..Self::empty(joints.len())
         };
-        let judged = candidates.into_iter().zip(statuses).zip(acting);
-        for (index, ((candidate, status), acting)) in judged.enumerate() {
-            library.terms.push(Term {
-                name: candidate.name,
-                family: candidate.family,
-                unit: candidate.unit,
-                status,
-                component: home[index],
-            });
-            library.stories.push(candidate.story);
-            library.prior_sds.push(candidate.prior_sd);
-            library.lagrangians.push(candidate.lagrangian);
-            library.images.push(candidate.image);
-            library
-                .sources
-                .push(candidate.model.map(|column| (column, acting)));
-        }
+        library.add_terms(candidates, (statuses, acting), &home);
         library.compile();
         if library.columns.is_empty() {
             return Err(Error::Setting {
@@ -163,27 +135,81 @@ impl Library {
                     .to_owned(),
             });
         }
+        library.find_aliases(like);
+        if let (Some(robot), false) = (about.robot, settings.linearised_at.is_empty()) {
+            library = library.linearised(robot, &settings.linearised_at)?;
+        }
+        Ok((library, findings))
+    }
+
+    /// Without a term.
+    fn empty(joints: usize) -> Self {
+        Self {
+            terms: Vec::new(),
+            components: Vec::new(),
+            stories: Vec::new(),
+            prior_sds: Vec::new(),
+            lagrangians: Vec::new(),
+            images: Vec::new(),
+            sources: Vec::new(),
+            graph: Arc::default(),
+            columns: Vec::new(),
+            by_joint: vec![Vec::new(); joints],
+            tape: Arc::default(),
+            model: None,
+            parts: Arc::default(),
+            payload_frame: None,
+            mixtures: Vec::new(),
+            payload_is_one: false,
+            linearised: None,
+        }
+    }
+
+    /// Adds judged candidates as terms; `home`: the component of each.
+    fn add_terms(
+        &mut self,
+        candidates: Vec<Candidate>,
+        (statuses, acting): judged::Judged,
+        home: &[usize],
+    ) {
+        let judged = candidates.into_iter().zip(statuses).zip(acting);
+        for (index, ((candidate, status), acting)) in judged.enumerate() {
+            self.terms.push(Term {
+                name: candidate.name,
+                family: candidate.family,
+                unit: candidate.unit,
+                status,
+                component: home[index],
+            });
+            self.stories.push(candidate.story);
+            self.prior_sds.push(candidate.prior_sd);
+            self.lagrangians.push(candidate.lagrangian);
+            self.images.push(candidate.image);
+            self.sources
+                .push(candidate.model.map(|column| (column, acting)));
+        }
+    }
+
+    /// Which components span the same torque for every motion; `like`: a library of the same robot where it is known.
+    fn find_aliases(&mut self, like: Option<&Self>) {
         let names = match like {
             Some(like) => {
-                library.payload_is_one = like.payload_is_one;
+                self.payload_is_one = like.payload_is_one;
                 let components = like.components.iter();
                 components
                     .map(|component| component.alias_of.clone())
                     .collect()
             }
             None => {
-                let states = random_motions(joints.len());
-                library.payload_is_one = overlaps::payload_is_one(&library, joints.len(), &states);
-                overlaps::spanning(&library, joints.len(), &states)
+                let joints = self.joints();
+                let states = random_motions(joints);
+                self.payload_is_one = overlaps::payload_is_one(self, joints, &states);
+                overlaps::spanning(self, joints, &states)
             }
         };
-        for (component, names) in library.components.iter_mut().zip(names) {
+        for (component, names) in self.components.iter_mut().zip(names) {
             component.alias_of = names;
         }
-        if let (Some(robot), false) = (about.robot, settings.linearised_at.is_empty()) {
-            library = library.linearised(robot, &settings.linearised_at)?;
-        }
-        Ok((library, findings))
     }
 
     /// As if motion told the payload from the link that carries it: where it acts in some of the logs alone.
@@ -542,25 +568,3 @@ fn home(components: &[Component], terms: usize) -> Vec<usize> {
 
 /// Bound that never acts: all columns of a component have bounds, or none.
 const UNBOUNDED: f64 = -1e100;
-
-/// States that have nothing in particular in common: a Weyl sequence with irrational steps.
-pub(super) fn random_motions(joints: usize) -> Vec<Motions> {
-    const STATES: usize = 40;
-    let value = |state: usize, joint: usize, k: usize| {
-        let step = ((3 * joint + k + 2) as f64).sqrt() * std::f64::consts::E;
-        2.0 * ((state as f64 + 1.0) * step).fract() - 1.0
-    };
-    (0..STATES)
-        .map(|state| {
-            (0..joints)
-                .map(|joint| {
-                    [
-                        3.0 * value(state, joint, 0),
-                        2.0 * value(state, joint, 1),
-                        5.0 * value(state, joint, 2),
-                    ]
-                })
-                .collect()
-        })
-        .collect()
-}

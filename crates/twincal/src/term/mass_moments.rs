@@ -3,8 +3,8 @@
 use super::Family;
 use super::body::{Body, Ten};
 use super::candidate::Proposal;
-use super::component::Parameter;
 use super::directions::{Columns, split};
+use super::parameter::Parameter;
 use crate::robot::spatial::transpose;
 
 /// `<link>.mass_moments`: differences of the first moments from the model with its density, about the model's centre of mass (mass × shift

@@ -9,17 +9,21 @@
 
 mod expression;
 mod euler_lagrange;
-mod candidate;
+mod motions;
+mod table;
 mod course;
 mod family;
 mod model_column;
 mod recipes;
 mod parts;
+mod body;
+mod parameter;
+mod mixture;
+mod candidate;
 mod viscous;
 mod coulomb;
 mod offset;
 mod motor_inertia;
-mod body;
 mod directions;
 mod payload;
 mod density;
@@ -55,20 +59,23 @@ mod linearisation;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use component::Before;
-pub use component::{Component, Parameter};
+pub use component::Component;
 pub use course::Course;
 pub use expression::Function;
 pub(crate) use expression::{Graph, Id as GraphId, Node, Variable};
 pub use family::Family;
-pub use library::{Library, Scratch, Table};
+pub use library::Library;
 pub(crate) use model_column::ModelColumn;
+pub use model_column::Scratch;
 pub(crate) use overlaps::levels;
+pub(crate) use parameter::Before;
+pub use parameter::Parameter;
 pub(crate) use payload::MASS as PAYLOAD_MASS;
 pub use recipes::Recipes;
 pub use sentence::{Estimate, is_place, told};
 pub use status::Status;
 pub(crate) use stribeck::STRIBECK_VELOCITY;
+pub use table::Table;
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

@@ -5,7 +5,7 @@
 //! nominal torque.
 
 use super::expression::TapeScratch;
-use super::parts::Table;
+use super::table::Table;
 use crate::robot::{
     BLOCK, BlockWorkspace, Motion, Regressor, RegressorBlock, Robot, STRIDE, gravity_regressor,
     nominal_torque, position_derivative,

@@ -1,7 +1,7 @@
 //! Which components no motion of this robot can tell from others: their torque lies in the others' span.
 
-use super::aliases::{Motions, channels};
 use super::component::Component;
+use super::motions::{Motions, channels};
 use super::{Family, Library};
 use crate::linear_algebra::dot;
 use crate::robot::Motion;

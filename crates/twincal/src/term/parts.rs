@@ -9,32 +9,13 @@ use super::course::Course;
 use super::expression::{Graph, Id, Slot, Tape};
 use super::model_column::{ModelColumn, ModelColumns, Scratch};
 use super::recipes::Recipes;
-use crate::lanes::Aligned;
+use super::table::Table;
 use crate::robot::{Robot, regrouped};
 use std::collections::BTreeMap;
-use std::ops::DerefMut;
 use std::sync::Arc;
 
 /// Shares below this of a column's largest are rounding.
 const ROUNDING: f64 = 1e-14;
-
-/// Memory for the signals of a joint, one after the other. Where it starts at a cache line they are written faster.
-pub trait Table: DerefMut<Target = [f64]> {
-    /// Another length; what the numbers are then is not said.
-    fn resize(&mut self, len: usize);
-}
-
-impl Table for Vec<f64> {
-    fn resize(&mut self, len: usize) {
-        Self::resize(self, len, 0.0);
-    }
-}
-
-impl Table for Aligned {
-    fn resize(&mut self, len: usize) {
-        Self::resize(self, len);
-    }
-}
 
 /// The parts of all columns of a library, ready to be evaluated.
 #[derive(Debug, Clone, Default)]

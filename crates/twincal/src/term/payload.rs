@@ -3,9 +3,10 @@
 use super::Family;
 use super::body::{Body, Ten};
 use super::candidate::{Candidate, Proposal};
-use super::component::{Before, Parameter};
-use super::directions::{Columns, Mixture, split};
+use super::directions::{Columns, split};
+use super::mixture::Mixture;
 use super::model_column::ModelColumn;
+use super::parameter::{Before, Parameter};
 use super::tensor;
 use crate::robot::to_body_frame;
 use crate::robot::{Placement, spatial};

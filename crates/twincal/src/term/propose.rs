@@ -1,10 +1,9 @@
 //! Which candidates a robot gets: every family that is switched on, in the order of `terms[]`.
 
-use super::aliases::channels;
 use super::candidate::{Joint, Proposal};
 use super::expression::Graph;
 use super::inertial::inertial;
-use super::library::random_motions;
+use super::motions::{channels, random_motions};
 use super::{
     Family, LibrarySettings, asymmetry, base_tilt, coulomb, coupled_friction, coupled_inertia,
     encoder_zero, gain, generic, hysteresis, load_friction, motor_inertia, offset, potential,

@@ -2,8 +2,8 @@
 
 use super::Family;
 use super::candidate::{Candidate, Joint, Proposal};
-use super::component::Parameter;
 use super::expression::Graph;
+use super::parameter::Parameter;
 
 /// `<joint>.spring`: columns `.stiffness` (torque +q) and `.preload` (torque +1), so that k (q − q₀) = k q + c with
 /// q₀ = −c/k. Lagrangian −½ k q² − c q.

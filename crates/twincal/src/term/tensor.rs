@@ -3,8 +3,8 @@
 use super::Family;
 use super::body::{Body, Ten};
 use super::candidate::Proposal;
-use super::component::Parameter;
 use super::directions::{Columns, split};
+use super::parameter::Parameter;
 use crate::robot::spatial::transpose;
 use crate::robot::{Placement, to_body_frame};
 

@@ -24,81 +24,119 @@ pub(super) fn statuses(
             statuses.push(Status::NullLagrangian); // e.g. the mass of a link on a vertical axis
             continue;
         }
-        let severity = if candidate.family == Family::User {
-            Severity::Warning
-        } else {
-            Severity::Note
-        };
         statuses.push(match verdict {
             Verdict::New => Status::Candidate,
             Verdict::NeverFinite(states) => {
                 return Err(Error::Term {
                     term: name.clone(),
                     column: 1,
-                    problem: format!("it or its torque is not a finite number at any of {states} random states"),
-                    remedy: "check the domains of log, sqrt and powers, and divisions by zero".to_owned(),
+                    problem: format!(
+                        "it or its torque is not a finite number at any of {states} random states"
+                    ),
+                    remedy: "check the domains of log, sqrt and powers, and divisions by zero"
+                        .to_owned(),
                 });
             }
             Verdict::Null => {
-                let why = if candidate.lagrangian.is_some_and(|phi| graph.as_constant(phi).is_some()) {
-                    "it is constant"
-                } else {
-                    "it is the time derivative of a function of q"
-                };
-                let message =
-                    format!("term `{name}` has no torque for any motion ({why}): it is no column; delete it or correct it");
-                findings.push(Finding::new(severity, Code::NullLagrangian, name, message, 1));
+                findings.push(null(graph, candidate));
                 Status::NullLagrangian
             }
             Verdict::NotCompared => {
-                let message = format!(
-                    "term `{name}` is a finite number at too few states to be compared with the others: whether it repeats \
-                     one of them was not checked; write it so that it exists for all motions of the robot"
-                );
-                findings.push(Finding::new(severity, Code::AliasUnchecked, name, message, 1));
+                findings.push(unchecked(candidate));
                 Status::Candidate
             }
             Verdict::Combination(combination) => {
-                let others: Vec<&str> = combination.iter().filter(|(_, k)| stands(*k)).map(|&(_, k)| candidates[k].name.as_str()).collect();
+                let others = combination.iter().filter(|(_, k)| stands(*k));
+                let others: Vec<(f64, &str)> = others
+                    .map(|&(factor, k)| (factor, candidates[k].name.as_str()))
+                    .collect();
+                let names: Vec<&str> = others.iter().map(|(_, other)| *other).collect();
+                let names = names.join(", ");
                 if candidate.family == Family::User {
-                    let formula: Vec<String> =
-                        combination.iter().filter(|(_, k)| stands(*k)).map(|&(factor, k)| share(factor, &candidates[k].name)).collect();
-                    let message = format!(
-                        "term `{name}` has the same torque as {} for every motion: it is no column; keep one of them",
-                        formula.join(" ")
-                    );
-                    findings.push(Finding::new(severity, Code::Alias, name, message, 1));
+                    findings.push(alias(candidate, &others));
                 } else {
-                    repeated.push(format!("{name} (by {})", others.join(", ")));
+                    repeated.push(format!("{name} (by {names})"));
                 }
-                Status::AliasOf(others.join(", "))
+                Status::AliasOf(names)
             }
         });
     }
     if !repeated.is_empty() {
-        let shown = repeated
-            .iter()
-            .take(10)
-            .cloned()
-            .collect::<Vec<_>>()
-            .join("; ");
-        let more = if repeated.len() > 10 {
-            format!("; and {} more", repeated.len() - 10)
-        } else {
-            String::new()
-        };
-        let message = format!(
-            "built-in terms whose torque others have for every motion are no columns: {shown}{more}"
-        );
-        findings.push(Finding::new(
-            Severity::Note,
-            Code::Alias,
-            "",
-            message,
-            repeated.len() as u64,
-        ));
+        findings.push(built_in_aliases(&repeated));
     }
     Ok(statuses)
+}
+
+/// A warning where the user wrote the term, else a note.
+fn about(candidate: &Candidate, code: Code, message: String) -> Finding {
+    let severity = match candidate.family {
+        Family::User => Severity::Warning,
+        _ => Severity::Note,
+    };
+    Finding::new(severity, code, &candidate.name, message, 1)
+}
+
+/// The term has no torque for any motion.
+fn null(graph: &Graph, candidate: &Candidate) -> Finding {
+    let constant = |phi| graph.as_constant(phi).is_some();
+    let why = match candidate.lagrangian.is_some_and(constant) {
+        true => "it is constant",
+        false => "it is the time derivative of a function of q",
+    };
+    let message = format!(
+        "term `{}` has no torque for any motion ({why}): it is no column; delete it or correct it",
+        candidate.name
+    );
+    about(candidate, Code::NullLagrangian, message)
+}
+
+/// The term exists at too few states to be compared.
+fn unchecked(candidate: &Candidate) -> Finding {
+    let message = format!(
+        "term `{}` is a finite number at too few states to be compared with the others: whether it repeats \
+         one of them was not checked; write it so that it exists for all motions of the robot",
+        candidate.name
+    );
+    about(candidate, Code::AliasUnchecked, message)
+}
+
+/// The term has the torque of others, each with its factor.
+fn alias(candidate: &Candidate, others: &[(f64, &str)]) -> Finding {
+    let formula: Vec<String> = others
+        .iter()
+        .map(|(factor, other)| share(*factor, other))
+        .collect();
+    let message = format!(
+        "term `{}` has the same torque as {} for every motion: it is no column; keep one of them",
+        candidate.name,
+        formula.join(" ")
+    );
+    about(candidate, Code::Alias, message)
+}
+
+/// Built-in terms that have the torque of others.
+fn built_in_aliases(repeated: &[String]) -> Finding {
+    let shown = repeated
+        .iter()
+        .take(10)
+        .cloned()
+        .collect::<Vec<_>>()
+        .join("; ");
+    let more = if repeated.len() > 10 {
+        format!("; and {} more", repeated.len() - 10)
+    } else {
+        String::new()
+    };
+    let message = format!(
+        "built-in terms whose torque others have for every motion are no columns: {shown}{more}"
+    );
+    Finding::new(
+        Severity::Note,
+        Code::Alias,
+        "",
+        message,
+        repeated.len() as u64,
+    )
 }
 
 /// "+2 × `name`", with six significant digits.

@@ -122,6 +122,22 @@ pub struct Writer<'a> {
     states: States,
 }
 
+/// Where coefficients go.
+struct Places<'a> {
+    /// Components that are to go into the file.
+    chosen: &'a [bool],
+    /// Components all of whose columns fit.
+    whole: &'a [bool],
+    /// Place of each column that the file holds.
+    held: &'a [Option<Place>],
+    /// All coefficients.
+    beta: &'a [f64],
+    /// Those of the columns that the file holds, as it holds them.
+    file: &'a [f64],
+    /// What the file holds of columns that do not fit.
+    shares: &'a [Share],
+}
+
 /// Share by which a number in the file may differ from the one in words before both are told: words round, too.
 const AS_TOLD: f64 = 0.02;
 
@@ -218,29 +234,45 @@ impl<'a> Writer<'a> {
             lacks: Vec::new(),
             torque_error: Vec::new(),
         };
+        let places = Places {
+            chosen,
+            whole: &whole,
+            held: &held,
+            beta,
+            file: &file,
+            shares: &shares,
+        };
+        self.measure(&mut change, &places)?;
+        self.report(&mut change, &places);
+        Ok(change)
+    }
+
+    /// Torque that the file has and lacks, by the robots before and after.
+    fn measure(&self, change: &mut WriteBack, places: &Places<'_>) -> Result<()> {
+        let (held, file, beta) = (places.held, places.file, places.beta);
+        let robot = &self.calibration.twin.robot;
         let (states, whole_robot) = (&self.states, change.robot(robot)?);
         let (robots, joints) = ([robot, &whole_robot], &change.joints);
-        change.lost = rms(&lost::difference(states, robots, joints, &held, &file));
-        let alone = lost::held_alone(&held, &file);
-        let linear = lost::beyond(states, robots, joints, &held, &alone);
+        change.lost = rms(&lost::difference(states, robots, joints, held, file));
+        let alone = lost::held_alone(held, file);
+        let linear = lost::beyond(states, robots, joints, held, &alone);
         change.dropped = dropped(robot, self.holds);
         let robots = [robot, &change.robot(robot)?];
         let without = lost::nominal_difference(states, [&whole_robot, robots[1]]);
         let in_file = InFile {
-            held: &held,
-            coefficients: &file,
+            held,
+            coefficients: file,
             lost: &linear,
             dropped: &self.dropped_coefficients(&change.dropped, &without),
         };
-        change.torque_error = self.torque_error(&change, &in_file);
+        change.torque_error = self.torque_error(change, &in_file);
         let mut correction = states.torque(beta);
         states.add_products(&mut correction);
         change.correction = rms(&correction);
-        let mut lacks = lost::beyond(states, robots, &change.joints, &held, beta);
+        let mut lacks = lost::beyond(states, robots, &change.joints, held, beta);
         states.add_products(&mut lacks);
         change.lacks = rms(&lacks);
-        self.tell(&mut change, (&whole, chosen), (beta, &file), &held, &shares);
-        Ok(change)
+        Ok(())
     }
 
     /// Places of columns that the data see and that are not `held`: what a file states there was not found.
@@ -296,96 +328,116 @@ impl<'a> Writer<'a> {
     }
 
     /// Says in words what went where.
-    fn tell(
-        &self,
-        change: &mut WriteBack,
-        (whole, chosen): (&[bool], &[bool]),
-        (beta, file): (&[f64], &[f64]),
-        held: &[Option<Place>],
-        shares: &[Share],
-    ) {
-        let robot = &self.calibration.twin.robot;
-        let name = |column: usize| {
-            self.library.terms()[self.library.columns()[column]]
-                .name
-                .clone()
-        };
+    fn report(&self, change: &mut WriteBack, places: &Places<'_>) {
         for (index, component) in self.calibration.components.iter().enumerate() {
-            let own: Vec<usize> = (0..beta.len())
+            let own: Vec<usize> = (0..places.beta.len())
                 .filter(|&column| self.component(column) == index)
                 .collect();
             let Some(pip) = component.pip.filter(|_| !own.is_empty()) else {
                 continue;
             };
-            if whole[index] {
-                let place = own.iter().find_map(|&column| held[column].as_ref());
-                let nearest = own.iter().find(|&&column| file[column] != beta[column]);
-                let averaged = || match (place, own.as_slice()) {
-                    (
-                        Some(Place::Viscous(_) | Place::Coulomb(_) | Place::Armature(_)),
-                        &[column],
-                    ) => {
-                        let told = component.parameters.first()?.told().0;
-                        let far = (file[column] - told).abs() > AS_TOLD * told.abs();
-                        far.then_some(file[column])
-                    }
-                    _ => None,
-                };
-                change.written.push(Written {
+            if places.whole[index] {
+                let written = self.written((component, pip), &own, places);
+                change.written.push(written);
+            } else {
+                let (coefficients, reason) = self.beside((index, component), &own, places);
+                let mut alone = vec![0.0; places.beta.len()];
+                coefficients
+                    .iter()
+                    .for_each(|&(column, value)| alone[column] += value);
+                change.residual.push(Residual {
                     component: component.name.clone(),
                     words: component.words.clone(),
                     pip,
-                    in_file: nearest.map(|&column| file[column]).or_else(averaged),
-                    nearest: nearest.is_some(),
-                    place: match place {
-                        Some(Place::Inertia { body, .. }) => {
-                            let link = links::home(self, *body, component.family);
-                            format!("link {link}")
-                        }
-                        Some(Place::Gravity(_)) | None => "gravity".into(),
-                        Some(
-                            Place::Viscous(joint)
-                            | Place::Coulomb(joint)
-                            | Place::Armature(joint)
-                            | Place::Stiffness(joint)
-                            | Place::Preload(joint),
-                        ) => format!("joint {}", robot.joint_names()[*joint]),
-                    },
+                    reason,
+                    torque: self.states.rms(&alone),
+                    coefficients: coefficients
+                        .iter()
+                        .map(|&(column, value)| (self.name(column).to_owned(), value))
+                        .collect(),
                 });
-                continue;
             }
-            let beside = linear_part::beside(&own, beta, shares);
-            let mut alone = vec![0.0; beta.len()];
-            beside
-                .iter()
-                .for_each(|&(column, value)| alone[column] += value);
-            change.residual.push(Residual {
-                component: component.name.clone(),
-                words: component.words.clone(),
-                pip,
-                reason: if beside.len() > own.len() {
-                    let what = reason(component.family, self.holds.format);
-                    let shares: Vec<String> = (beside[own.len()..].iter())
-                        .map(|(column, value)| format!("{} {:+.3}", name(*column), -value))
-                        .collect();
-                    format!(
-                        "{what}; added to the file as nearest to it: {}",
-                        shares.join(", ")
-                    )
-                } else if chosen[index] {
-                    reason(component.family, self.holds.format)
-                } else {
-                    format!("it is {}, not established", component.status.word())
-                },
-                torque: self.states.rms(&alone),
-                coefficients: beside
-                    .iter()
-                    .map(|&(column, value)| (name(column), value))
-                    .collect(),
-            });
         }
         let size = |residual: &Residual| residual.torque.iter().fold(0.0_f64, |m, x| m.max(*x));
         change.residual.sort_by(|a, b| size(b).total_cmp(&size(a)));
+    }
+
+    /// A component that the file holds, of these columns.
+    fn written(
+        &self,
+        (component, pip): (&ComponentSummary, f64),
+        own: &[usize],
+        places: &Places<'_>,
+    ) -> Written {
+        let (beta, file) = (places.beta, places.file);
+        let place = own.iter().find_map(|&column| places.held[column].as_ref());
+        let nearest = own.iter().find(|&&column| file[column] != beta[column]);
+        let averaged = || match (place, own) {
+            (Some(Place::Viscous(_) | Place::Coulomb(_) | Place::Armature(_)), &[column]) => {
+                let reported = component.parameters.first()?.told().0;
+                let far = (file[column] - reported).abs() > AS_TOLD * reported.abs();
+                far.then_some(file[column])
+            }
+            _ => None,
+        };
+        Written {
+            component: component.name.clone(),
+            words: component.words.clone(),
+            pip,
+            in_file: nearest.map(|&column| file[column]).or_else(averaged),
+            nearest: nearest.is_some(),
+            place: self.place_name(place, component.family),
+        }
+    }
+
+    /// Link or joint that changes with a component of that family.
+    fn place_name(&self, place: Option<&Place>, family: Family) -> String {
+        match place {
+            Some(Place::Inertia { body, .. }) => {
+                format!("link {}", links::home(self, *body, family))
+            }
+            Some(Place::Gravity(_)) | None => "gravity".into(),
+            Some(
+                Place::Viscous(joint)
+                | Place::Coulomb(joint)
+                | Place::Armature(joint)
+                | Place::Stiffness(joint)
+                | Place::Preload(joint),
+            ) => {
+                let robot = &self.calibration.twin.robot;
+                format!("joint {}", robot.joint_names()[*joint])
+            }
+        }
+    }
+
+    /// Coefficients of a component that stay beside the file, by column, and why they do.
+    fn beside(
+        &self,
+        (index, component): (usize, &ComponentSummary),
+        own: &[usize],
+        places: &Places<'_>,
+    ) -> (Vec<(usize, f64)>, String) {
+        let beside = linear_part::beside(own, places.beta, places.shares);
+        let reason = if beside.len() > own.len() {
+            let what = reason(component.family, self.holds.format);
+            let shares: Vec<String> = (beside[own.len()..].iter())
+                .map(|(column, value)| format!("{} {:+.3}", self.name(*column), -value))
+                .collect();
+            format!(
+                "{what}; added to the file as nearest to it: {}",
+                shares.join(", ")
+            )
+        } else if places.chosen[index] {
+            reason(component.family, self.holds.format)
+        } else {
+            format!("it is {}, not established", component.status.word())
+        };
+        (beside, reason)
+    }
+
+    /// Name of a column's term.
+    fn name(&self, column: usize) -> &str {
+        &self.library.terms()[self.library.columns()[column]].name
     }
 }
 

@@ -37,30 +37,42 @@ pub(super) fn source(evaluator: &Evaluator, about: &[String]) -> Result<String> 
         }
     }
     out.push_str("    let mut outside = false;\n    let mut half: f64;\n");
-    for (j, joint) in evaluator.joints.iter().enumerate() {
-        for (k, low, high) in bounds(&joint.limits) {
-            let input = INPUTS[k];
-            let _ = writeln!(
-                out,
-                "    outside |= !({input}[{j}] >= {} && {input}[{j}] <= {});",
-                literal(low),
-                literal(high)
-            );
-        }
-        let variance = operand(evaluator, evaluator.variance[j]);
-        let _ = write!(
-            out,
-            "    outside |= !({variance} <= {});\n\
-             \x20   half = {} * sqrt({} * f64::max({variance}, 0.0) + {});\n\
-             \x20   tau[{j}] = {};\n    low[{j}] = tau[{j}] - half;\n    high[{j}] = tau[{j}] + half;\n",
-            literal(joint.noise),
-            literal(evaluator.quantile),
-            literal(evaluator.ratio),
-            literal(joint.base),
-            operand(evaluator, evaluator.torque[j]),
-        );
+    for joint in 0..n {
+        write_joint(&mut out, evaluator, joint);
     }
     out.push_str("    let _ = (q, qd, qdd);\n    outside\n}\n");
+    write_mathematics(&mut out, used);
+    Ok(out)
+}
+
+/// Whether a joint's state is outside the data, its torque and the ends of its interval.
+fn write_joint(out: &mut String, evaluator: &Evaluator, j: usize) {
+    let joint = &evaluator.joints[j];
+    for (k, low, high) in bounds(&joint.limits) {
+        let input = INPUTS[k];
+        let _ = writeln!(
+            out,
+            "    outside |= !({input}[{j}] >= {} && {input}[{j}] <= {});",
+            literal(low),
+            literal(high)
+        );
+    }
+    let variance = operand(evaluator, evaluator.variance[j]);
+    let _ = write!(
+        out,
+        "    outside |= !({variance} <= {});\n\
+         \x20   half = {} * sqrt({} * f64::max({variance}, 0.0) + {});\n\
+         \x20   tau[{j}] = {};\n    low[{j}] = tau[{j}] - half;\n    high[{j}] = tau[{j}] + half;\n",
+        literal(joint.noise),
+        literal(evaluator.quantile),
+        literal(evaluator.ratio),
+        literal(joint.base),
+        operand(evaluator, evaluator.torque[j]),
+    );
+}
+
+/// The functions that are `used`, with those that they use.
+fn write_mathematics(out: &mut String, mut used: Vec<&'static str>) {
     for _ in 0..2 {
         let more: Vec<&str> = (MATHEMATICS.iter())
             .filter(|(name, ..)| used.contains(name))
@@ -72,7 +84,6 @@ pub(super) fn source(evaluator: &Evaluator, about: &[String]) -> Result<String> 
         out.push('\n');
         out.push_str(text);
     }
-    Ok(out)
 }
 
 fn expression(

@@ -147,16 +147,7 @@ pub(super) fn merge<'t>(
             return Ok(cells);
         }
     }
-    let of_disk = |e: io::Error| unreadable(file, &e);
-    let mut used = Vec::new();
-    for &part in &numbers {
-        let rows = parts[part].take_stored(file)?;
-        let step = match numbers.len() {
-            1 => f64::INFINITY,
-            _ => rows.median_step().map_err(of_disk)?,
-        };
-        used.push(Used { part, rows, step });
-    }
+    let used = take_used(file, &numbers, parts)?;
     parts.iter_mut().for_each(Part::clear);
     let names = robot.joint_names();
     let describe = |Used { part, rows, step }: &Used| {
@@ -171,55 +162,105 @@ pub(super) fn merge<'t>(
     };
     let back = used.iter().find(|used| parts[used.part].steps_back);
     if let Some(back) = back.filter(|_| used.len() > 1) {
-        return Err(Error::content(
-            Place::file(file),
-            format!(
-                "time of {} steps back, so its joints cannot be brought together with the others",
-                describe(back)
-            ),
-            "cut the log where the clock was set, or publish all joints in one message",
-        ));
+        return Err(steps_back(file, &describe(back)));
     }
     let slowest = (0..used.len()).min_by_key(|&k| used[k].rows.len());
     let slowest = slowest.unwrap_or(0);
     let rows = used[slowest].rows.len();
-    let width = 1 + sources.len();
-    let mut cells = if may_spill && Cells::is_long(rows, width) {
-        Cells::new(width, true)
-    } else {
-        Cells::reserve(file, rows, width, false)?
-    };
+    let mut cells = table(file, (rows, 1 + sources.len()), may_spill)?;
     let lost = fill(&mut cells, file, &used, slowest, &sources)?;
-    if used.len() == 1 {
-        return Ok(cells);
+    if used.len() > 1 {
+        let others = used.iter().enumerate().filter(|(k, _)| *k != slowest);
+        let others: Vec<String> = others.map(|(_, used)| describe(used)).collect();
+        let merged = Merged {
+            others: listed(&others, " and "),
+            slowest: describe(&used[slowest]),
+            lost,
+            rows,
+        };
+        findings.push(merged.finding(file)?);
     }
-    let others = used.iter().enumerate().filter(|(k, _)| *k != slowest);
-    let others: Vec<String> = others.map(|(_, used)| describe(used)).collect();
-    let (others, slowest) = (listed(&others, " and "), describe(&used[slowest]));
-    if (lost as f64) > (1.0 - COVERED) * rows as f64 {
-        return Err(Error::content(
-            Place::file(file),
-            format!(
-                "joints or channels come in messages of their own that hardly overlap in time: {lost} of {rows} stamps of {slowest} have no values of {others}"
-            ),
-            "check the publishers' clocks, or fix joints that do not move with [model] locked",
-        ));
-    }
-    let severity = if (lost as f64) > EDGES * rows as f64 {
-        Severity::Warning
-    } else {
-        Severity::Note
-    };
-    findings.push(Finding::new(
-        severity,
-        Code::PartsMerged,
-        file,
-        format!(
-            "joints or channels come in messages of their own: {others} brought to the stamps of {slowest} by linear interpolation; {lost} of {rows} rows lie outside or in gaps and are NaN"
-        ),
-        lost as u64,
-    ));
     Ok(cells)
+}
+
+/// The clock of a part, in words, was set back.
+fn steps_back(file: &str, part: &str) -> Error {
+    Error::content(
+        Place::file(file),
+        format!(
+            "time of {part} steps back, so its joints cannot be brought together with the others"
+        ),
+        "cut the log where the clock was set, or publish all joints in one message",
+    )
+}
+
+/// A table in memory, or one that leaves memory as it comes where it may and is long.
+fn table(file: &str, (rows, width): (usize, usize), may_spill: bool) -> Result<Cells> {
+    if may_spill && Cells::is_long(rows, width) {
+        return Ok(Cells::new(width, true));
+    }
+    Cells::reserve(file, rows, width, false)
+}
+
+/// Rows of the parts of these `numbers`.
+fn take_used(file: &str, numbers: &[usize], parts: &mut [Part]) -> Result<Vec<Used>> {
+    let mut used = Vec::new();
+    for &part in numbers {
+        let rows = parts[part].take_stored(file)?;
+        let step = match numbers.len() {
+            1 => f64::INFINITY,
+            _ => rows.median_step().map_err(|e| unreadable(file, &e))?,
+        };
+        used.push(Used { part, rows, step });
+    }
+    Ok(used)
+}
+
+/// Parts that were brought together.
+struct Merged {
+    /// The parts in words, and the slowest one, whose stamps the rows have.
+    others: String,
+    slowest: String,
+    /// Rows without a value of some part.
+    lost: usize,
+    rows: usize,
+}
+
+impl Merged {
+    /// # Errors
+    /// [`Error::Content`] where the parts hardly overlap.
+    fn finding(&self, file: &str) -> Result<Finding> {
+        let Self {
+            others,
+            slowest,
+            lost,
+            rows,
+        } = self;
+        let share = |of: f64| of * *rows as f64;
+        if (*lost as f64) > share(1.0 - COVERED) {
+            return Err(Error::content(
+                Place::file(file),
+                format!(
+                    "joints or channels come in messages of their own that hardly overlap in time: {lost} of {rows} stamps of {slowest} have no values of {others}"
+                ),
+                "check the publishers' clocks, or fix joints that do not move with [model] locked",
+            ));
+        }
+        let severity = if (*lost as f64) > share(EDGES) {
+            Severity::Warning
+        } else {
+            Severity::Note
+        };
+        Ok(Finding::new(
+            severity,
+            Code::PartsMerged,
+            file,
+            format!(
+                "joints or channels come in messages of their own: {others} brought to the stamps of {slowest} by linear interpolation; {lost} of {rows} rows lie outside or in gaps and are NaN"
+            ),
+            *lost as u64,
+        ))
+    }
 }
 
 /// The columns of the table behind its time, from the parts of these `numbers`.

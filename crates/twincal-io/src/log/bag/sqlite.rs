@@ -27,61 +27,9 @@ pub(super) fn read(
     sink: &mut JointStates<'_>,
 ) -> Result<()> {
     refuse_unfinished(path, file)?;
-    let broken = |e: rusqlite::Error| {
-        Error::content(
-            Place::file(file),
-            format!("is not a whole SQLite bag: {e}"),
-            "copy it again, or repair it with `ros2 bag convert`",
-        )
-    };
-    let flags = OpenFlags::SQLITE_OPEN_READ_ONLY
-        | OpenFlags::SQLITE_OPEN_URI
-        | OpenFlags::SQLITE_OPEN_NO_MUTEX;
-    let bag = Connection::open_with_flags(uri(path), flags).map_err(broken)?;
-    // SQLite opens by path: what it opened has to be what was looked at.
-    if !still_leads_to(path, opened).is_ok_and(|same| same) {
-        let problem = "was replaced by another file while it was opened";
-        return Err(Error::content(
-            Place::file(file),
-            problem,
-            "read it again when nobody writes it",
-        ));
-    }
-    let limit = i32::try_from(MAX_RECORD).unwrap_or(i32::MAX);
-    bag.set_limit(Limit::SQLITE_LIMIT_LENGTH, limit)
-        .map_err(broken)?;
-    bag.set_db_config(DbConfig::SQLITE_DBCONFIG_TRUSTED_SCHEMA, false)
-        .map_err(broken)?;
-    for table in ["topics", "messages"] {
-        if !is_plain_table(&bag, table).map_err(broken)? {
-            return Err(Error::content(
-                Place::file(file),
-                format!("is a SQLite file without a table `{table}`"),
-                "give a bag of rosbag2",
-            ));
-        }
-    }
-    let mut definitions = definitions(&bag).map_err(broken)?;
-    let mut topics: BTreeMap<i64, TopicId> = BTreeMap::new();
-    let mut query = bag
-        .prepare(
-            "SELECT id, substr(name, 1, 5000), substr(type, 1, 5000), substr(serialization_format, 1, 5000) \
-             FROM topics ORDER BY id",
-        )
-        .map_err(broken)?;
-    let mut rows = query.query([]).map_err(broken)?;
-    while let Some(row) = rows.next().map_err(broken)? {
-        let text = |column| row.get::<_, String>(column).map_err(broken);
-        let (name, kind, encoding) = (text(1)?, text(2)?, text(3)?);
-        let schema = (definitions.entry(kind)).or_insert_with_key(|kind| {
-            Rc::new(Schema {
-                kind: kind.clone(),
-                ..Schema::default()
-            })
-        });
-        let topic = sink.topic(&name, Some(schema.clone()), &encoding)?;
-        topics.insert(row.get(0).map_err(broken)?, topic);
-    }
+    let broken = |e: rusqlite::Error| broken(file, &e);
+    let bag = open(opened, path, file)?;
+    let topics = topics(&bag, file, sink)?;
     let mut query = bag
         .prepare("SELECT topic_id, timestamp, data FROM messages ORDER BY id")
         .map_err(broken)?;
@@ -109,6 +57,78 @@ pub(super) fn read(
         sink.message(topic, time, data)?;
     }
     Ok(())
+}
+
+fn broken(file: &str, e: &rusqlite::Error) -> Error {
+    Error::content(
+        Place::file(file),
+        format!("is not a whole SQLite bag: {e}"),
+        "copy it again, or repair it with `ros2 bag convert`",
+    )
+}
+
+/// The bag, whose tables of topics and messages hold stored values.
+fn open(opened: &File, path: &Path, file: &str) -> Result<Connection> {
+    let broken = |e: rusqlite::Error| broken(file, &e);
+    let flags = OpenFlags::SQLITE_OPEN_READ_ONLY
+        | OpenFlags::SQLITE_OPEN_URI
+        | OpenFlags::SQLITE_OPEN_NO_MUTEX;
+    let bag = Connection::open_with_flags(uri(path), flags).map_err(broken)?;
+    // SQLite opens by path: what it opened has to be what was looked at.
+    if !still_leads_to(path, opened).is_ok_and(|same| same) {
+        let problem = "was replaced by another file while it was opened";
+        return Err(Error::content(
+            Place::file(file),
+            problem,
+            "read it again when nobody writes it",
+        ));
+    }
+    let limit = i32::try_from(MAX_RECORD).unwrap_or(i32::MAX);
+    bag.set_limit(Limit::SQLITE_LIMIT_LENGTH, limit)
+        .map_err(broken)?;
+    bag.set_db_config(DbConfig::SQLITE_DBCONFIG_TRUSTED_SCHEMA, false)
+        .map_err(broken)?;
+    for table in ["topics", "messages"] {
+        if !is_plain_table(&bag, table).map_err(broken)? {
+            return Err(Error::content(
+                Place::file(file),
+                format!("is a SQLite file without a table `{table}`"),
+                "give a bag of rosbag2",
+            ));
+        }
+    }
+    Ok(bag)
+}
+
+/// The topics by their numbers in the bag.
+fn topics(
+    bag: &Connection,
+    file: &str,
+    sink: &mut JointStates<'_>,
+) -> Result<BTreeMap<i64, TopicId>> {
+    let broken = |e: rusqlite::Error| broken(file, &e);
+    let mut definitions = definitions(bag).map_err(broken)?;
+    let mut topics: BTreeMap<i64, TopicId> = BTreeMap::new();
+    let mut query = bag
+        .prepare(
+            "SELECT id, substr(name, 1, 5000), substr(type, 1, 5000), substr(serialization_format, 1, 5000) \
+             FROM topics ORDER BY id",
+        )
+        .map_err(broken)?;
+    let mut rows = query.query([]).map_err(broken)?;
+    while let Some(row) = rows.next().map_err(broken)? {
+        let text = |column| row.get::<_, String>(column).map_err(broken);
+        let (name, kind, encoding) = (text(1)?, text(2)?, text(3)?);
+        let schema = (definitions.entry(kind)).or_insert_with_key(|kind| {
+            Rc::new(Schema {
+                kind: kind.clone(),
+                ..Schema::default()
+            })
+        });
+        let topic = sink.topic(&name, Some(schema.clone()), &encoding)?;
+        topics.insert(row.get(0).map_err(broken)?, topic);
+    }
+    Ok(topics)
 }
 
 /// Whether there is a table of that name whose values are stored: a view, a virtual table or a computed column could compute without

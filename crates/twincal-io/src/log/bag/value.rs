@@ -151,20 +151,7 @@ pub(super) fn find(root: &Value, steps: &[Step], joint: Joint<'_>) -> Result<Fou
     for (number, step) in steps.iter().enumerate() {
         let before = Written(&steps[..number]);
         if let Step::Field(name) = step {
-            let Value::Record(fields) = value else {
-                return Err(format!(
-                    "`{before}` is {}, it has no field `{name}`; correct the path",
-                    value.words()
-                ));
-            };
-            let Some(index) = fields.iter().position(|(field, _)| field == name) else {
-                let names = fields.iter().map(|(field, _)| field.as_str());
-                return Err(format!(
-                    "there is no field `{}`; {}",
-                    Written(&steps[..=number]),
-                    did_you_mean(name, names)
-                ));
-            };
+            let (fields, index) = field(value, name, (before, Written(&steps[..=number])))?;
             enclosing.push(Enclosing {
                 fields,
                 at: found.at.clone(),
@@ -179,53 +166,17 @@ pub(super) fn find(root: &Value, steps: &[Step], joint: Joint<'_>) -> Result<Fou
                 value.words()
             ));
         };
-        let index = match step {
-            Step::Index(index) if *index >= length => {
-                return Err(format!(
-                    "`{before}` has {length} entries, none of number {index} (from 0); correct the path"
-                ));
-            }
-            Step::Index(index) => *index,
-            Step::Name(name) => {
-                let (index, check) = named(value, &found.at, &enclosing, |known| known == name)?
-                    .ok_or_else(|| unnamed(&before, name, value, &enclosing))?;
-                found.checks.push(check);
-                index
-            }
-            _ => {
-                let own = joint.names[joint.number];
-                let anyone = |known: &str| joint.names.contains(&known);
-                if let Some((index, check)) =
-                    named(value, &found.at, &enclosing, |known| known == own)?
-                {
-                    found.by_name = Some(true);
-                    found.checks.push(check);
-                    index
-                } else if named(value, &found.at, &enclosing, anyone).is_ok_and(|one| one.is_none())
-                {
-                    if length != joint.names.len() {
-                        return Err(format!(
-                            "`{before}` has {length} entries, the model has {} moving joints, and nothing says which is whose; write a path per joint: {{ {own} = \"…[number]\" }}",
-                            joint.names.len()
-                        ));
-                    }
-                    if let Some(names) = other_names(&enclosing, length) {
-                        return Err(format!(
-                            "`{before}` has the names {}, and none of them is a joint of the model; write a path per joint: {{ {own} = \"…[name]\" }}",
-                            quoted(&names)
-                        ));
-                    }
-                    found.by_name = Some(false);
-                    found.checks.push((found.at.clone(), Check::Length(length)));
-                    joint.number
-                } else {
-                    return Err(unnamed(&before, own, value, &enclosing));
-                }
-            }
+        let list = List {
+            before,
+            value,
+            length,
+            enclosing: &enclosing,
         };
+        let index = found.entry(&list, step, joint)?;
         if index >= length {
             return Err(format!(
-                "`{before}` has {length} entries, the names beside it have more; fix the publisher"
+                "`{}` has {length} entries, the names beside it have more; fix the publisher",
+                list.before
             ));
         }
         found.at.push(index);
@@ -235,6 +186,94 @@ pub(super) fn find(root: &Value, steps: &[Step], joint: Joint<'_>) -> Result<Fou
         };
     }
     Ok(found)
+}
+
+/// The fields of a record, and the place of one of them; the paths up to the record and to the field are for messages.
+fn field<'v>(
+    value: &'v Value,
+    name: &str,
+    (before, path): (Written<'_>, Written<'_>),
+) -> Result<(&'v [(String, Value)], usize), String> {
+    let Value::Record(fields) = value else {
+        return Err(format!(
+            "`{before}` is {}, it has no field `{name}`; correct the path",
+            value.words()
+        ));
+    };
+    let Some(index) = fields.iter().position(|(field, _)| field == name) else {
+        let names = fields.iter().map(|(field, _)| field.as_str());
+        return Err(format!(
+            "there is no field `{path}`; {}",
+            did_you_mean(name, names)
+        ));
+    };
+    Ok((fields, index))
+}
+
+/// A list on the way to a place.
+struct List<'a> {
+    /// The path to it.
+    before: Written<'a>,
+    value: &'a Value,
+    length: usize,
+    /// The records around it, outermost first.
+    enclosing: &'a [Enclosing<'a>],
+}
+
+impl Found {
+    /// Number of the entry of a list that a step means.
+    fn entry(&mut self, list: &List<'_>, step: &Step, joint: Joint<'_>) -> Result<usize, String> {
+        let List { before, length, .. } = list;
+        match step {
+            Step::Index(index) if index >= length => Err(format!(
+                "`{before}` has {length} entries, none of number {index} (from 0); correct the path"
+            )),
+            Step::Index(index) => Ok(*index),
+            Step::Name(name) => {
+                let (index, check) =
+                    named(list.value, &self.at, list.enclosing, |known| known == name)?
+                        .ok_or_else(|| unnamed(before, name, list.value, list.enclosing))?;
+                self.checks.push(check);
+                Ok(index)
+            }
+            _ => self.entry_of_joint(list, joint),
+        }
+    }
+
+    /// Number of a joint's entry: by name, or in the model's order where nothing says whose the entries are.
+    fn entry_of_joint(&mut self, list: &List<'_>, joint: Joint<'_>) -> Result<usize, String> {
+        let List {
+            before,
+            value,
+            length,
+            enclosing,
+        } = list;
+        let own = joint.names[joint.number];
+        if let Some((index, check)) = named(value, &self.at, enclosing, |known| known == own)? {
+            self.by_name = Some(true);
+            self.checks.push(check);
+            return Ok(index);
+        }
+        let anyone = |known: &str| joint.names.contains(&known);
+        if !named(value, &self.at, enclosing, anyone).is_ok_and(|one| one.is_none()) {
+            return Err(unnamed(before, own, value, enclosing));
+        }
+        if *length != joint.names.len() {
+            return Err(format!(
+                "`{before}` has {length} entries, the model has {} moving joints, and nothing says which is whose; write a path per joint: {{ {own} = \"…[number]\" }}",
+                joint.names.len()
+            ));
+        }
+        if let Some(names) = other_names(enclosing, *length) {
+            return Err(format!(
+                "`{before}` has the names {}, and none of them is a joint of the model; write a path per joint: {{ {own} = \"…[name]\" }}",
+                quoted(&names)
+            ));
+        }
+        self.by_name = Some(false);
+        self.checks.push((self.at.clone(), Check::Length(*length)));
+        Ok(joint.number)
+    }
 }
 
 type Named = (usize, (Vec<At>, Check));

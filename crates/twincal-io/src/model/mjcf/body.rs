@@ -10,7 +10,7 @@ use super::inertial::{moved, of_body, shift};
 use super::shapes::Placed;
 use super::sites::{BodySite, JointSite, Sites};
 use crate::error::{Error, Result};
-use twincal::robot::spatial::{add, apply, axis_angle, norm, scale};
+use twincal::robot::spatial::{Matrix, add, apply, axis_angle, norm, scale};
 use twincal::robot::{JointDescription, JointKind, Limits, LinkDescription, Placement};
 use twincal::{Code, Finding, Severity};
 
@@ -118,21 +118,53 @@ impl<'a> Tree<'a> {
         let parts = self.parts(element, element.text("childclass").or(task.childclass))?;
         // Pose of the body while its joints are at their reference, in the parent link's frame.
         let pose = task.frame.compose(&self.compiler.placement(&view)?);
-
-        let mut parent = task.parent;
-        let mut pending = pose; // pose of the next joint's link before that joint, in `parent`
-        let mut origin = [0.0; 3]; // origin of `parent`'s frame in the body's frame, once a joint has been laid
         let joints: Vec<&Part<'a>> = parts
             .iter()
             .filter(|p| p.element.name == "joint" || p.element.name == "freejoint")
             .collect();
+        let moves = task.moves || !joints.is_empty();
+        let origin = self.lay_joints(&joints, &name, (task.parent, pose))?;
+        let inertia = of_body(
+            self.document,
+            &self.compiler,
+            &self.defaults,
+            &parts,
+            &name,
+            moves,
+        )?;
+        let inertial = self.inertial_site(&parts)?;
+        self.sites.bodies.push(BodySite {
+            link: name.clone(),
+            offset: element.offset,
+            inertial,
+            origin,
+        });
+        self.links.push(LinkDescription {
+            name: name.clone(),
+            inertia: inertia.map(|i| moved(i, origin)),
+        });
+        self.push_geoms(&parts, &name, origin);
+        self.push_children(tasks, &parts, &name, origin, moves);
+        Ok(())
+    }
+
+    /// Lays the joints of a body one after the other from its parent link on, a weld where there is none, with the links between them; gives the
+    /// origin of the body's link in the body's frame. `pose`: of the body in the frame of `parent`.
+    fn lay_joints(
+        &mut self,
+        joints: &[&Part<'a>],
+        name: &str,
+        (mut parent, pose): (String, Placement),
+    ) -> Result<[f64; 3]> {
+        let mut pending = pose; // pose of the next joint's link before that joint, in `parent`
+        let mut origin = [0.0; 3]; // origin of `parent`'s frame in the body's frame, once a joint has been laid
         for (k, part) in joints.iter().enumerate() {
             let child = if k + 1 == joints.len() {
-                name.clone()
+                name.to_owned()
             } else {
                 format!("{name}.link{}", k + 1)
             };
-            let (mut joint, anchor, reference) = self.read_joint(part, &name, k)?;
+            let (mut joint, anchor, reference) = self.read_joint(part, name, k)?;
             joint.parent = parent;
             joint.child = child.clone();
             joint.placement = if joint.kind == JointKind::Prismatic {
@@ -161,40 +193,23 @@ impl<'a> Tree<'a> {
         }
         if joints.is_empty() {
             let mut weld =
-                JointDescription::new(&format!("{name}.weld"), JointKind::Fixed, &parent, &name);
+                JointDescription::new(&format!("{name}.weld"), JointKind::Fixed, &parent, name);
             weld.placement = pose;
             self.joints.push(weld);
             self.references.push(0.0);
         }
-        let moves = task.moves || !joints.is_empty();
-        let inertia = of_body(
-            self.document,
-            &self.compiler,
-            &self.defaults,
-            &parts,
-            &name,
-            moves,
-        )?;
-        let inertia = inertia.map(|i| moved(i, origin));
-        let mut inertial = None;
+        Ok(origin)
+    }
+
+    /// Where the `<inertial>` of a body stands: its place in the file, the frames around it, its own rotation.
+    fn inertial_site(&self, parts: &[Part<'a>]) -> Result<Option<(usize, Placement, Matrix)>> {
+        let mut site = None;
         for part in parts.iter().filter(|p| p.element.name == "inertial") {
             let view = View::plain(self.document, part.element);
             let own = self.compiler.placement(&view)?.rotation;
-            inertial = Some((part.element.offset, part.placement, own));
+            site = Some((part.element.offset, part.placement, own));
         }
-        self.sites.bodies.push(BodySite {
-            link: name.clone(),
-            offset: element.offset,
-            inertial,
-            origin,
-        });
-        self.links.push(LinkDescription {
-            name: name.clone(),
-            inertia,
-        });
-        self.push_geoms(&parts, &name, origin);
-        self.push_children(tasks, &parts, &name, origin, moves);
-        Ok(())
+        Ok(site)
     }
 
     /// Geoms of a body, whose link has its origin there.

@@ -1,18 +1,16 @@
 //! Joint and marginal posterior distributions of the kept coefficients (paper fig. 3).
 
+mod hexagons;
+
 use crate::report::figure::{Figure, Image, NARROW};
 use crate::report::scale::Scale;
-use crate::report::svg::{Anchor, Path, Svg};
+use crate::report::svg::{Anchor, Svg};
 use crate::report::text::{shorten, text_width};
 use crate::words::list::{first_of, list};
 use crate::words::number::{count, fixed, percent};
-use std::collections::BTreeMap;
+use hexagons::{HEX, hexagons};
 use twincal::calibrate::{Draws, TermSummary};
 
-/// Radius of a hexagon, px.
-const HEX: f64 = 3.6;
-/// Shades of the hexagons, light to dark.
-const SHADES: [&str; 5] = ["h1", "h2", "h3", "h4", "h5"];
 const BARS: usize = 18;
 /// What is drawn of long tails; of a normal distribution everything.
 const FAR: f64 = 4.0;
@@ -186,95 +184,145 @@ struct Variable<'a> {
 }
 
 fn draw(variables: &[Variable<'_>], label: &str) -> String {
-    let k = variables.len();
-    let cell = cell(k);
-    let names: Vec<&str> = variables.iter().map(|v| v.name).collect();
-    let numbered = numbered(&names);
-    let label_of = |index: usize| -> Vec<String> {
-        if numbered {
-            return vec![(index + 1).to_string()];
-        }
-        let name = name_lines(names[index]).into_iter().map(str::to_owned);
-        let unit = Some(variables[index].unit).filter(|unit| !unit.is_empty() && *unit != "1");
-        name.chain(unit.map(|unit| format!("({unit})"))).collect()
-    };
-    let names_at = if numbered { 16.0 } else { NAMES };
-    let (left, top) = (names_at + TICKS, 8.0);
-    let at = |i: usize| i as f64 * (cell + GAP);
-    let size = at(k) - GAP;
-    let labels: Vec<Vec<String>> = (0..k).map(label_of).collect();
-    let widths = labels.iter().flatten().map(|line| text_width(line, LABEL));
-    let longest = if numbered {
+    let grid = Grid::new(variables);
+    let widths = grid.labels.iter().flatten();
+    let widths = widths.map(|line| text_width(line, LABEL));
+    let longest = if grid.numbered {
         LINE
     } else {
         widths.fold(0.0, f64::max)
     };
-    let mut svg = Svg::new(left + size + 12.0, top + size + 28.0 + longest);
-    let scales: Vec<Scale> = variables
-        .iter()
-        .map(|v| Scale::over(bulk(v.values), (0.0, cell)))
-        .collect();
-    for (row, y) in variables.iter().enumerate() {
-        for (column, x) in variables.iter().enumerate() {
-            let corner = (left + at(column), top + at(row));
-            if column <= row {
-                svg.rect("cell", corner, (cell, cell), None);
+    let size = grid.size();
+    let mut svg = Svg::new(grid.left + size + 12.0, TOP + size + 28.0 + longest);
+    for row in 0..variables.len() {
+        for column in 0..variables.len() {
+            grid.draw_cell(&mut svg, row, column);
+        }
+        grid.draw_label(&mut svg, row);
+    }
+    svg.finish(label)
+}
+
+/// Upper edge of the first row.
+const TOP: f64 = 8.0;
+
+/// A cell for each pair of variables, with their names beside and below.
+struct Grid<'a> {
+    variables: &'a [Variable<'a>],
+    /// Of each variable over the width of a cell.
+    scales: Vec<Scale>,
+    /// Lines of each variable's label.
+    labels: Vec<Vec<String>>,
+    /// Labels are numbers: names do not fit.
+    numbered: bool,
+    /// Width and height of a cell.
+    cell: f64,
+    /// Right end of the labels beside the rows, and left edge of the first column.
+    names_at: f64,
+    left: f64,
+}
+
+impl<'a> Grid<'a> {
+    fn new(variables: &'a [Variable<'a>]) -> Self {
+        let cell = cell(variables.len());
+        let names: Vec<&str> = variables.iter().map(|v| v.name).collect();
+        let numbered = numbered(&names);
+        let label_of = |index: usize| -> Vec<String> {
+            if numbered {
+                return vec![(index + 1).to_string()];
             }
-            let place = |scale: &Scale, range| Scale { range, ..*scale };
-            // Hexagons at the edge of the data stay inside the cell.
-            let inset = HEX + 2.0;
-            let x_scale = place(&scales[column], (corner.0 + inset, corner.0 + cell - inset));
-            let y_scale = place(&scales[row], (corner.1 + cell - inset, corner.1 + inset));
-            match column.cmp(&row) {
-                std::cmp::Ordering::Less => {
-                    hexagons(&mut svg, x.values, y.values, x_scale, y_scale)
-                }
-                std::cmp::Ordering::Equal => {
-                    histogram(&mut svg, x.values, x_scale, (corner.1, corner.1 + cell))
-                }
-                std::cmp::Ordering::Greater => {
-                    let r = correlation(x.values, y.values);
-                    let class = if r.abs() >= STRONG {
-                        "number strong"
-                    } else {
-                        "number"
-                    };
-                    let middle = (corner.0 + 0.5 * cell, corner.1 + 0.5 * cell + 5.0);
-                    svg.text(class, middle, Anchor::Middle, &fixed(r, 2));
-                }
+            let name = name_lines(names[index]).into_iter().map(str::to_owned);
+            let unit = Some(variables[index].unit).filter(|unit| !unit.is_empty() && *unit != "1");
+            name.chain(unit.map(|unit| format!("({unit})"))).collect()
+        };
+        let names_at = if numbered { 16.0 } else { NAMES };
+        Self {
+            scales: variables
+                .iter()
+                .map(|v| Scale::over(bulk(v.values), (0.0, cell)))
+                .collect(),
+            labels: (0..variables.len()).map(label_of).collect(),
+            variables,
+            numbered,
+            cell,
+            names_at,
+            left: names_at + TICKS,
+        }
+    }
+
+    /// Where a row or column begins behind the first.
+    fn at(&self, index: usize) -> f64 {
+        index as f64 * (self.cell + GAP)
+    }
+
+    /// Width and height of all cells.
+    fn size(&self) -> f64 {
+        self.at(self.variables.len()) - GAP
+    }
+
+    /// Hexagons below the diagonal, a histogram on it, the correlation above.
+    fn draw_cell(&self, svg: &mut Svg, row: usize, column: usize) {
+        let (cell, corner) = (self.cell, (self.left + self.at(column), TOP + self.at(row)));
+        let (x, y) = (&self.variables[column], &self.variables[row]);
+        if column <= row {
+            svg.rect("cell", corner, (cell, cell), None);
+        }
+        let place = |scale: &Scale, range| Scale { range, ..*scale };
+        // Hexagons at the edge of the data stay inside the cell.
+        let inset = HEX + 2.0;
+        let x_range = (corner.0 + inset, corner.0 + cell - inset);
+        let x_scale = place(&self.scales[column], x_range);
+        let y_range = (corner.1 + cell - inset, corner.1 + inset);
+        let y_scale = place(&self.scales[row], y_range);
+        match column.cmp(&row) {
+            std::cmp::Ordering::Less => {
+                hexagons(svg, pixels([x.values, y.values], [x_scale, y_scale]))
             }
-            if row + 1 == k {
-                for (x, text) in labels_inside(&x_scale) {
-                    svg.text("t", (x, corner.1 + cell + 15.0), Anchor::Middle, &text);
-                }
+            std::cmp::Ordering::Equal => {
+                histogram(svg, x.values, x_scale, (corner.1, corner.1 + cell))
             }
-            if column == 0 && row > 0 {
-                for (value, text) in y_scale.ticks(4) {
-                    svg.text(
-                        "t",
-                        (corner.0 - 5.0, y_scale.at(value) + 3.8),
-                        Anchor::End,
-                        &text,
-                    );
-                }
+            std::cmp::Ordering::Greater => {
+                let r = correlation(x.values, y.values);
+                let class = if r.abs() >= STRONG {
+                    "number strong"
+                } else {
+                    "number"
+                };
+                let middle = (corner.0 + 0.5 * cell, corner.1 + 0.5 * cell + 5.0);
+                svg.text(class, middle, Anchor::Middle, &fixed(r, 2));
             }
         }
-        let label = &labels[row];
-        let middle = at(row) + 0.5 * cell;
+        if row + 1 == self.variables.len() {
+            for (x, text) in labels_inside(&x_scale) {
+                svg.text("t", (x, corner.1 + cell + 15.0), Anchor::Middle, &text);
+            }
+        }
+        if column == 0 && row > 0 {
+            for (value, text) in y_scale.ticks(4) {
+                let at = (corner.0 - 5.0, y_scale.at(value) + 3.8);
+                svg.text("t", at, Anchor::End, &text);
+            }
+        }
+    }
+
+    /// A variable's name beside its row and below its column.
+    fn draw_label(&self, svg: &mut Svg, index: usize) {
+        let label = &self.labels[index];
+        let middle = self.at(index) + 0.5 * self.cell;
         let first = -0.5 * LINE * (label.len() as f64 - 1.0);
         for (line, text) in label.iter().enumerate() {
             let shift = middle + first + LINE * line as f64 + 4.0;
             let class = if line == 0 { "name small" } else { "l" };
-            svg.text(class, (names_at, top + shift), Anchor::End, text);
-            let below = top + size + 24.0;
-            if numbered {
-                svg.text(class, (left + middle, below + 8.0), Anchor::Middle, text);
+            svg.text(class, (self.names_at, TOP + shift), Anchor::End, text);
+            let below = TOP + self.size() + 24.0;
+            if self.numbered {
+                let at = (self.left + middle, below + 8.0);
+                svg.text(class, at, Anchor::Middle, text);
             } else {
-                svg.text_up(class, (left + shift, below), Anchor::End, text);
+                svg.text_up(class, (self.left + shift, below), Anchor::End, text);
             }
         }
     }
-    svg.finish(label)
 }
 
 /// Each coefficient on its own, for a phone.
@@ -390,62 +438,13 @@ fn histogram(svg: &mut Svg, values: &[f64], x: Scale, (top, bottom): (f64, f64))
     }
 }
 
-fn hexagons(svg: &mut Svg, x: &[f64], y: &[f64], x_scale: Scale, y_scale: Scale) {
+/// Pixels of the draws that hold both terms, within both scales.
+fn pixels([x, y]: [&[f64]; 2], [x_scale, y_scale]: [Scale; 2]) -> impl Iterator<Item = (f64, f64)> {
     let inside = |scale: &Scale, v: f64| is_in(v) && v >= scale.domain.0 && v <= scale.domain.1;
-    let points = x
-        .iter()
+    x.iter()
         .zip(y)
-        .filter(|(x, y)| inside(&x_scale, **x) && inside(&y_scale, **y));
-    let bins = hexbin(points.map(|(x, y)| (x_scale.at(*x), y_scale.at(*y))));
-    let most = bins.values().copied().max().unwrap_or(1);
-    for (shade, class) in SHADES.into_iter().enumerate() {
-        let mut path = Path::new();
-        for (&(column, row), &n) in &bins {
-            if shade_of(n, most) == shade {
-                let (cx, cy) = hex_centre(column, row);
-                path = path.polygon((0..6).map(|corner| {
-                    let angle = std::f64::consts::FRAC_PI_3 * f64::from(corner)
-                        + std::f64::consts::FRAC_PI_6;
-                    (cx + HEX * angle.cos(), cy + HEX * angle.sin())
-                }));
-            }
-        }
-        svg.path(class, path);
-    }
-}
-
-/// Counts per hexagon of a grid with pointy tops, key (column, row).
-fn hexbin(points: impl Iterator<Item = (f64, f64)>) -> BTreeMap<(i32, i32), usize> {
-    let mut bins = BTreeMap::new();
-    for (x, y) in points {
-        // The nearest centre is in one of the two rows around y.
-        let below = (y / (1.5 * HEX)).floor() as i32;
-        let nearest = [below, below + 1].map(|row| {
-            let shift = 0.5 * f64::from(row.rem_euclid(2));
-            let column = (x / (3f64.sqrt() * HEX) - shift).round() as i32;
-            let (cx, cy) = hex_centre(column, row);
-            ((x - cx).powi(2) + (y - cy).powi(2), (column, row))
-        });
-        let key = if nearest[0].0 <= nearest[1].0 {
-            nearest[0].1
-        } else {
-            nearest[1].1
-        };
-        *bins.entry(key).or_insert(0) += 1;
-    }
-    bins
-}
-
-fn hex_centre(column: i32, row: i32) -> (f64, f64) {
-    let shift = 0.5 * f64::from(row.rem_euclid(2));
-    (
-        3f64.sqrt() * HEX * (f64::from(column) + shift),
-        1.5 * HEX * f64::from(row),
-    )
-}
-
-fn shade_of(n: usize, most: usize) -> usize {
-    ((n as f64 / most as f64).sqrt() * SHADES.len() as f64).ceil() as usize - 1
+        .filter(move |(x, y)| inside(&x_scale, **x) && inside(&y_scale, **y))
+        .map(move |(x, y)| (x_scale.at(*x), y_scale.at(*y)))
 }
 
 /// Correlation of every pair (i < j) of sets of draws.
@@ -482,27 +481,6 @@ fn correlation(x: &[f64], y: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn hexagons_partition_the_plane_by_nearest_centre() {
-        for i in 0..400 {
-            let point = (
-                f64::from(i * 37 % 101) * 0.31 - 7.0,
-                f64::from(i * 53 % 89) * 0.29 - 6.0,
-            );
-            let bins = hexbin(std::iter::once(point));
-            let (&(column, row), _) = bins.first_key_value().unwrap();
-            let distance = |c, r| {
-                let (cx, cy) = hex_centre(c, r);
-                (point.0 - cx).hypot(point.1 - cy)
-            };
-            let best = (-10..10)
-                .flat_map(|r| (-10..10).map(move |c| (c, r)))
-                .map(|(c, r)| distance(c, r))
-                .fold(f64::INFINITY, f64::min);
-            assert!((distance(column, row) - best).abs() < 1e-9, "{point:?}");
-        }
-    }
 
     #[test]
     fn correlation_of_closed_forms() {
@@ -574,13 +552,5 @@ mod tests {
                 .contains(">shoulder_lift_joint.quadratic_friction<")
         );
         assert_eq!(name_lines("sin(0.5*q1)"), ["sin(0.5*q1)"]);
-    }
-
-    #[test]
-    fn shades_span_their_range() {
-        assert_eq!(
-            (shade_of(1, 1000), shade_of(1000, 1000), shade_of(1, 1)),
-            (0, 4, 4)
-        );
     }
 }

@@ -1,12 +1,13 @@
 //! What is judged of candidates at random motions: which are columns, and on which joints they act.
 
 use super::super::Status;
-use super::super::aliases::{Motions, channels, judge};
+use super::super::aliases::judge;
 use super::super::candidate::Candidate;
 use super::super::expression::Graph;
 use super::super::model_column::{ModelColumn, ModelColumns, Scratch};
+use super::super::motions::{Motions, channels, random_motions};
 use super::super::verdicts::statuses;
-use super::{Library, random_motions};
+use super::Library;
 use crate::error::{Finding, Result};
 use crate::robot::Motion;
 

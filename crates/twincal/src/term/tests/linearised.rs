@@ -1,7 +1,6 @@
 //! A library about effects that multiply each other.
 
-use super::super::aliases::channels;
-use super::super::library::random_motions;
+use super::super::motions::{channels, random_motions};
 use super::super::{Family, Library, LibrarySettings, ModelColumn};
 use crate::robot::testing::tree;
 use crate::robot::{Change, Motion, Robot, nominal_torque};

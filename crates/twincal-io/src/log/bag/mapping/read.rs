@@ -3,6 +3,7 @@
 use super::{Form, LOG_TIME, Mapped, Mapping, Reading, Time};
 use crate::config::TimeUnit;
 use crate::log::bag::decode::{self, MAX_MESSAGE, Plan, Walked};
+use crate::log::bag::definition::Definition;
 use crate::log::bag::path::Step;
 use crate::log::bag::value::{At, Check, Joint, Number, Value, find, stamp_parts};
 use std::mem::take;
@@ -77,78 +78,19 @@ impl Mapped {
         data: &[u8],
     ) -> Result<Sample, Problem> {
         match take(&mut found.form) {
-            Form::Binary { definition, plan } => {
-                let paths = self.paths(found.time.as_ref());
-                let mut plan = plan;
-                let walked = match &plan {
-                    Some(places) => {
-                        decode::read(&definition, data, &places.plan, &mut found.numbers)
-                    }
-                    None => Ok(Walked::Changed),
-                };
-                let walked = match walked {
-                    Ok(Walked::Changed) => decode::tree(&definition, data, &paths)
-                        .map_err(Problem::Broken)
-                        .and_then(|tree| self.find(&tree, found.time.as_ref(), names))
-                        .and_then(|new| {
-                            let checks = new.checks.iter();
-                            let new_plan = Plan::new(&definition, &new.places, checks);
-                            let walked =
-                                decode::read(&definition, data, &new_plan, &mut found.numbers);
-                            found.by_name = new.by_name;
-                            plan = Some(Places { plan: new_plan });
-                            walked.map_err(Problem::Broken)
-                        }),
-                    other => other.map_err(Problem::Broken),
-                };
+            Form::Binary {
+                definition,
+                mut plan,
+            } => {
+                let walked = self.read_binary(found, (&definition, &mut plan), names, data);
                 found.form = Form::Binary { definition, plan };
                 if walked? == Walked::Changed {
                     return Err(Problem::Broken("its names cannot be told apart".into()));
                 }
             }
-            Form::Json => {
-                if data.len() > MAX_MESSAGE {
-                    return Err(Problem::Broken(format!(
-                        "it has {} bytes, the limit for mapped topics is {MAX_MESSAGE}",
-                        data.len()
-                    )));
-                }
-                let json = serde_json::from_slice(data)
-                    .map_err(|e| Problem::Broken(format!("it is not JSON: {e}")))?;
-                let tree = Value::of_json(json);
-                if found.time.is_none() {
-                    let there = |steps: &[Step]| {
-                        let joint = Joint { number: 0, names };
-                        let place = find(&tree, steps, joint);
-                        place.is_ok_and(|place| stamp_parts(&tree, &place.at).is_some())
-                    };
-                    found.time = Some(self.time_source(there));
-                }
-                let new = self.find(&tree, found.time.as_ref(), names)?;
-                found.by_name = new.by_name;
-                found.numbers.clear();
-                for (at, place) in new.places.iter().enumerate() {
-                    let number = tree.number(place).map_err(|what| {
-                        let path = self.targets.get(at).map_or("time", |t| &t.source.text);
-                        Problem::Unfit(format!(
-                            "`{path}` is {what}, not a number; correct the path"
-                        ))
-                    })?;
-                    found.numbers.push(number);
-                }
-            }
+            Form::Json => self.read_json(found, names, data)?,
         }
-        let stamp = match &found.time {
-            Some(Time::Path(_, words)) => {
-                let parts = &found.numbers[self.targets.len()..];
-                let stamp = stamp(parts, unit)
-                    .map_err(|what| Problem::Broken(format!("its {words} {what}")))?;
-                found.lag += log_time as f64 - stamp as f64;
-                stamp
-            }
-            _ => i64::try_from(log_time)
-                .map_err(|_| Problem::Broken(format!("its {LOG_TIME} is {log_time} ns")))?,
-        };
+        let stamp = self.stamp(found, unit, log_time)?;
         if found.messages == 0 {
             found.first_stamp = stamp;
         }
@@ -158,6 +100,83 @@ impl Mapped {
             stamp,
             part: found.part,
         })
+    }
+
+    /// Numbers of a message by the plan of those before it; by a new plan where names are others.
+    fn read_binary(
+        &self,
+        found: &mut Reading,
+        (definition, plan): (&Definition, &mut Option<Places>),
+        names: &[&str],
+        data: &[u8],
+    ) -> Result<Walked, Problem> {
+        if let Some(places) = plan {
+            let walked = decode::read(definition, data, &places.plan, &mut found.numbers)
+                .map_err(Problem::Broken)?;
+            if walked != Walked::Changed {
+                return Ok(walked);
+            }
+        }
+        let paths = self.paths(found.time.as_ref());
+        let tree = decode::tree(definition, data, &paths).map_err(Problem::Broken)?;
+        let new = self.find(&tree, found.time.as_ref(), names)?;
+        let new_plan = Plan::new(definition, &new.places, new.checks.iter());
+        let walked = decode::read(definition, data, &new_plan, &mut found.numbers);
+        found.by_name = new.by_name;
+        *plan = Some(Places { plan: new_plan });
+        walked.map_err(Problem::Broken)
+    }
+
+    /// Numbers of a message in JSON.
+    fn read_json(&self, found: &mut Reading, names: &[&str], data: &[u8]) -> Result<(), Problem> {
+        if data.len() > MAX_MESSAGE {
+            return Err(Problem::Broken(format!(
+                "it has {} bytes, the limit for mapped topics is {MAX_MESSAGE}",
+                data.len()
+            )));
+        }
+        let json = serde_json::from_slice(data)
+            .map_err(|e| Problem::Broken(format!("it is not JSON: {e}")))?;
+        let tree = Value::of_json(json);
+        if found.time.is_none() {
+            let there = |steps: &[Step]| {
+                let joint = Joint { number: 0, names };
+                let place = find(&tree, steps, joint);
+                place.is_ok_and(|place| stamp_parts(&tree, &place.at).is_some())
+            };
+            found.time = Some(self.time_source(there));
+        }
+        let new = self.find(&tree, found.time.as_ref(), names)?;
+        found.by_name = new.by_name;
+        found.numbers.clear();
+        for (at, place) in new.places.iter().enumerate() {
+            let number = tree.number(place).map_err(|what| {
+                let path = self.targets.get(at).map_or("time", |t| &t.source.text);
+                Problem::Unfit(format!(
+                    "`{path}` is {what}, not a number; correct the path"
+                ))
+            })?;
+            found.numbers.push(number);
+        }
+        Ok(())
+    }
+
+    /// Point in time of the message whose numbers were read, ns: its own, or when it was logged.
+    fn stamp(
+        &self,
+        found: &mut Reading,
+        unit: Option<TimeUnit>,
+        log_time: u64,
+    ) -> Result<i64, Problem> {
+        let Some(Time::Path(_, words)) = &found.time else {
+            return i64::try_from(log_time)
+                .map_err(|_| Problem::Broken(format!("its {LOG_TIME} is {log_time} ns")));
+        };
+        let parts = &found.numbers[self.targets.len()..];
+        let stamp =
+            stamp(parts, unit).map_err(|what| Problem::Broken(format!("its {words} {what}")))?;
+        found.lag += log_time as f64 - stamp as f64;
+        Ok(stamp)
     }
 
     /// The steps of all that is wanted.

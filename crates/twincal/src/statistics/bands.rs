@@ -1,0 +1,193 @@
+//! Power of a joint's columns and torque in bands of frequencies: sums over rows that add.
+//!
+//! With X_m the discrete Fourier transform of a run of rows `x = [columns, y]`, padded to M ≥ 2n, and bands of frequencies f (cycles per row),
+//!
+//! ```text
+//! P_b = Σ_{m: f_m ∈ b} Re(X_m X_m*) / M,     Σ_b P_b = Σ x xᵀ
+//! ```
+//! Bands grow by a quarter with frequency: a lag at which noise of some memory still correlates is short beside 1 over the width of the
+//! bands in which that noise has its power. Sums of runs, parts and logs add.
+
+use crate::gram::Symmetric;
+use crate::linear_algebra::dot;
+use crate::observations::Part;
+use realfft::RealFftPlanner;
+use realfft::num_complex::Complex;
+use std::ops::{AddAssign, Range};
+
+/// Upper end of the lowest band, cycles per row, and how much higher that of the next one is.
+const LOWEST: f64 = 1.0 / 512.0;
+const GROWTH: f64 = 1.25;
+/// Rows that are transformed at a time.
+const LONGEST: usize = 4096;
+/// A short run is padded to eight times its length, but to no more than this: its power between bins is what says which band it is in.
+const PADDED: usize = 1024;
+
+/// P_b of the signals of one joint and y, band by band.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct Bands {
+    pub(crate) power: Vec<Symmetric>,
+    /// Rows of the longest run, at most [`LONGEST`].
+    pub(crate) longest: usize,
+}
+
+impl Bands {
+    /// Number of bands.
+    pub(crate) const COUNT: usize = 26;
+
+    /// Of the moving rows of a joint, as the fit weighs them.
+    pub(super) fn of(part: &Part<'_>, joint: usize) -> Self {
+        let (all, rows) = (part.observations, &part.observations.joints[joint]);
+        let signals = rows.signals();
+        let mut bands = Self {
+            power: vec![Symmetric::zeros(signals + 1); edges().len() - 1],
+            longest: 0,
+        };
+        let mut run = Run {
+            values: vec![Vec::new(); signals + 1],
+            planner: RealFftPlanner::new(),
+        };
+        for range in part.runs_between_starts() {
+            rows.visit_signals(all.len(), range, &mut |range, columns| {
+                let moving = |row: &usize| !rows.standstill[*row];
+                let mut from = range.start;
+                while from < range.end {
+                    if !moving(&from) {
+                        bands.end(&mut run);
+                        from += 1;
+                        continue;
+                    }
+                    let most = (range.end - from).min(LONGEST - run.len());
+                    let to = from + (from..from + most).take_while(moving).count();
+                    for (i, values) in run.values[..signals].iter_mut().enumerate() {
+                        values.extend_from_slice(columns.of(i, from - range.start, to - from));
+                    }
+                    run.values[signals].extend_from_slice(&rows.y[from..to]);
+                    run.weigh(&rows.weight, from..to);
+                    if run.len() == LONGEST {
+                        bands.end(&mut run);
+                    }
+                    from = to;
+                }
+            });
+            bands.end(&mut run);
+        }
+        bands
+    }
+
+    /// Of some of the signals.
+    pub(super) fn of_signals(&self, signals: &[usize]) -> Self {
+        let of = |sums: &Symmetric| {
+            let rows: Vec<usize> = signals.iter().copied().chain([sums.size - 1]).collect();
+            sums.of(&rows)
+        };
+        Self {
+            power: self.power.iter().map(of).collect(),
+            longest: self.longest,
+        }
+    }
+
+    fn end(&mut self, run: &mut Run) {
+        self.longest = self.longest.max(run.len());
+        run.add_to(&mut self.power);
+    }
+}
+
+impl AddAssign<&Bands> for Bands {
+    /// # Panics
+    /// If the two belong to different signals.
+    fn add_assign(&mut self, other: &Bands) {
+        self.longest = self.longest.max(other.longest);
+        for (sum, own) in self.power.iter_mut().zip(&other.power) {
+            *sum += own;
+        }
+    }
+}
+
+/// Ends of the bands, cycles per row.
+pub(super) fn edges() -> Vec<f64> {
+    let grown = std::iter::successors(Some(LOWEST), |edge| Some(edge * GROWTH));
+    let below = grown.take_while(|edge| *edge * GROWTH.sqrt() < 0.5);
+    std::iter::once(0.0).chain(below).chain([0.5]).collect()
+}
+
+/// Rows of one run: signals and y.
+struct Run {
+    values: Vec<Vec<f64>>,
+    planner: RealFftPlanner<f64>,
+}
+
+impl Run {
+    fn len(&self) -> usize {
+        self.values.last().map_or(0, Vec::len)
+    }
+
+    /// Multiplies the rows that came last with the roots of what they count.
+    fn weigh(&mut self, weight: &[f64], rows: Range<usize>) {
+        let Some(weight) = weight.get(rows) else {
+            return;
+        };
+        let from = self.len() - weight.len();
+        for values in &mut self.values {
+            let own = values[from..].iter_mut().zip(weight);
+            own.for_each(|(value, u)| *value *= u.sqrt());
+        }
+    }
+
+    /// Adds the power of the run, which begins anew.
+    fn add_to(&mut self, power: &mut [Symmetric]) {
+        let rows = self.len();
+        if rows == 0 {
+            return;
+        }
+        let padded = (8 * rows).min(PADDED).max(2 * rows).next_power_of_two();
+        let transform = self.planner.plan_fft_forward(padded);
+        let mut scratch = transform.make_scratch_vec();
+        let bins = padded / 2 + 1;
+        // Real and imaginary parts by turns: a band is a stretch of them.
+        let transformed: Vec<Vec<f64>> = (self.values.iter_mut())
+            .map(|values| {
+                let mut input = std::mem::take(values);
+                input.resize(padded, 0.0);
+                let mut output = vec![Complex::new(0.0, 0.0); bins];
+                let done = transform.process_with_scratch(&mut input, &mut output, &mut scratch);
+                debug_assert!(done.is_ok(), "lengths are the plan's");
+                let scaled = output.iter().enumerate().flat_map(|(m, x)| {
+                    let twice = if m == 0 || m == bins - 1 { 1.0 } else { 2.0 };
+                    let root = f64::sqrt(twice / padded as f64);
+                    [x.re * root, x.im * root]
+                });
+                scaled.collect()
+            })
+            .collect();
+        let bin = |edge: f64| (edge * padded as f64).ceil() as usize;
+        let edges = edges();
+        for (band, sums) in edges.windows(2).zip(power) {
+            let last = band[1] >= 0.5;
+            let stretch = 2 * bin(band[0])..2 * if last { bins } else { bin(band[1]) };
+            if stretch.is_empty() {
+                continue;
+            }
+            for i in 0..sums.size {
+                for j in 0..=i {
+                    let pair = [i, j].map(|signal| &transformed[signal][stretch.clone()]);
+                    let product = dot(pair[0], pair[1]);
+                    sums.values[i * sums.size + j] += product;
+                    if i != j {
+                        sums.values[j * sums.size + i] += product;
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn there_are_as_many_bands_as_files_hold() {
+        assert_eq!(edges().len() - 1, Bands::COUNT);
+    }
+}
