@@ -173,6 +173,23 @@ fn case_107_durations_do_not_follow_a_clock_that_is_set_back() {
     assert_eq!(read("out/result.json"), read("plain/result.json"));
 }
 
+/// 10 million draws of 1000 chains: no machine holds them, and a failed allocation would end the process in the middle.
+#[test]
+fn more_draws_than_the_memory_holds_are_refused() {
+    let folder = folder();
+    let at = folder.path();
+    fs::write(at.join("run.csv"), common::csv(2000, &|_, row| row)).unwrap();
+    let many = "[library]\nfamilies = [\"viscous\", \"coulomb\"]\n[inference]\nmethod = \"gibbs\"\nchains = 1000\ndraws = 10000000\n";
+    fs::write(at.join("many.toml"), many).unwrap();
+    let line = "fit run.csv --model arm.urdf --config many.toml -o out";
+    run(at, line.split(' ')).expect(2).says(&[
+        "inference.draws",
+        "MB are free",
+        "use fewer draws or chains",
+    ]);
+    assert!(!at.join("out").exists());
+}
+
 #[test]
 fn case_113_a_config_does_not_read_variables_of_the_environment() {
     let folder = folder();

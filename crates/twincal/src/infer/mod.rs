@@ -61,6 +61,23 @@ pub struct InferenceSettings {
     pub allow_disagreement: bool,
 }
 
+/// Bytes that the draws of all chains take, of a problem with so many components and columns; 0 where all models are summed.
+///
+/// A chain keeps two numbers of each component and one of each column per draw, and the longest run so far stands beside the next one.
+#[must_use]
+pub fn bytes_of_chains(components: usize, columns: usize, settings: &InferenceSettings) -> u64 {
+    let sums = settings.method == Choice::Exact
+        || settings.method == Choice::Auto && components <= EXACT_LIMIT;
+    if sums {
+        return 0;
+    }
+    let numbers = [settings.chains, settings.draws, 2 * components + columns];
+    let bytes = 2 * size_of::<f64>() as u64;
+    numbers
+        .iter()
+        .fold(bytes, |all, &own| all.saturating_mul(own as u64))
+}
+
 /// The posterior of `problem` by the chosen method.
 ///
 /// # Errors
