@@ -41,7 +41,7 @@ BUGS = [
     (
         "one urn for all families",
         "infer/exact/plan.rs",
-        ".filter(|&e| standard.blocks[e].family == block.family)",
+        ".filter(|&e| blocks[e].family == blocks[index].family)",
         ".filter(|&e| e < index)",
     ),
     (
@@ -135,12 +135,6 @@ BUGS = [
         "let own = count as f64 / expected - 1.0;",
     ),
     (
-        "a t likelihood that claims the information of known weights",
-        "plug_in/tempering.rs",
-        "(FREEDOM - t2)",
-        "(FREEDOM + t2)",
-    ),
-    (
         "a settled structure that the data may overrule",
         "prior.rs",
         "odds: vec![SETTLED, 1.0 / SETTLED],",
@@ -167,7 +161,7 @@ BUGS = [
     (
         "a child is decided before its parent, and nobody asks",
         "infer/exact/plan.rs",
-        "bound_by: kin.bound_by(index),",
+        "bound_by: self.kin.bound_by(self.index),",
         "bound_by: 0,",
     ),
     (
