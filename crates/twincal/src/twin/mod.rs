@@ -22,6 +22,20 @@ use crate::term::{Family, Library, LibrarySettings};
 use serde::{Deserialize, Serialize};
 
 /// Robot + terms + posterior. Everything a prediction needs, nothing else; this is what `twin.json` holds.
+///
+/// # Example
+/// A twin is the same after it was written and read, to the last bit.
+/// ```
+/// # #[path = "../../examples/two_link.rs"] mod two_link;
+/// use twincal::prelude::*;
+///
+/// # let fit = two_link::study()?;
+/// let text = serde_json::to_string(fit.twin())?;
+/// let again: Twin = serde_json::from_str(&text)?;
+/// assert_eq!(&again, fit.twin());
+/// assert_eq!(again.robot.joint_names(), ["shoulder", "elbow"]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Twin {
     /// The nominal robot.
