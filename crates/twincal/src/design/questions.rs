@@ -39,6 +39,21 @@ const NOISE: u64 = STREAM + (1 << 40);
 type Motions<'a> = [Option<(&'a States, f64)>; 2];
 
 /// What is asked of a posterior.
+///
+/// # Example
+/// Effects are asked by name. Without names every effect with a probability between 0.05 and 0.95 is a question.
+/// ```
+/// # #[path = "../../examples/two_link.rs"] mod two_link;
+/// use twincal::design::Questions;
+///
+/// # let fit = two_link::study()?;
+/// let problem = fit.problem.as_ref().ok_or("a twin of a fleet has none")?;
+/// let (library, rate) = (fit.twin().library()?, fit.kept_rate_hz());
+/// let ask = |name: &str| Questions::new((problem, fit.twin()), (&library, rate), &[name.to_owned()]);
+/// assert!(ask("elbow.viscous")?.names().eq(["elbow.viscous"])); // for `Task::questions`
+/// assert!(ask("wrist.viscous").is_err());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug)]
 pub struct Questions<'a> {
     problem: &'a Problem,
