@@ -166,6 +166,13 @@ impl Error {
 }
 
 /// How much a [`Finding`] matters.
+///
+/// # Example
+/// ```
+/// use twincal::Severity;
+///
+/// assert!(Severity::Note < Severity::Warning && Severity::Warning < Severity::Degraded);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Severity {

@@ -161,6 +161,16 @@ impl Twin {
     ///
     /// # Panics
     /// If there is no such joint.
+    ///
+    /// # Example
+    /// The shoulder was between −1 and 1 rad in the logs; within 5 % of this range beyond its ends a prediction is no extrapolation.
+    /// ```
+    /// # #[path = "../../examples/two_link.rs"] mod two_link;
+    /// # let fit = two_link::study()?;
+    /// let [low, high, ..] = fit.twin().limits(0);
+    /// assert!((low + 1.1).abs() < 0.01 && (high - 1.1).abs() < 0.01);
+    /// # Ok::<(), twincal::Error>(())
+    /// ```
     #[must_use]
     pub fn limits(&self, joint: usize) -> [f64; 6] {
         let hull = reachable(self.hull[joint], self.robot.joint_kind(joint));
