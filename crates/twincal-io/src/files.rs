@@ -20,10 +20,22 @@ use twincal::signal::Recording;
 /// Those of [`read_model`](crate::model::read_model) and [`Model::robot`](crate::model::Model::robot), with file, line and column.
 ///
 /// # Example
-/// ```no_run
-/// let robot = twincal_io::read_robot("arm.urdf")?;
-/// println!("{}", robot.joint_names().join(", "));
-/// # Ok::<(), twincal_io::Error>(())
+/// A pendulum of 1 kg at 0.5 m; `arm.urdf` is its model.
+/// ```
+/// use twincal::robot::{Workspace, inverse_dynamics};
+///
+/// # let text = r#"<robot name="pendulum"><link name="base"/><link name="rod"><inertial><origin xyz="0 0 -0.5"/><mass value="1"/>
+/// # <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+/// # <joint name="pivot" type="continuous"><parent link="base"/><child link="rod"/><axis xyz="0 1 0"/></joint></robot>"#;
+/// # let folder = tempfile::tempdir()?;
+/// # let path = folder.path().join("arm.urdf");
+/// # std::fs::write(&path, text)?;
+/// let robot = twincal_io::read_robot(&path)?;
+/// assert_eq!(robot.joint_names(), ["pivot"]);
+/// let mut tau = [0.0]; // held level
+/// inverse_dynamics(&robot, &mut Workspace::new(&robot), &[std::f64::consts::FRAC_PI_2], &[0.0], &[0.0], &mut tau);
+/// assert!((tau[0] - 9.81 * 1.0 * 0.5).abs() < 1e-9);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn read_robot(path: impl AsRef<Path>) -> Result<Robot> {
     let model = read_model(path.as_ref(), &ModelSettings::default())?;
@@ -35,6 +47,23 @@ pub fn read_robot(path: impl AsRef<Path>) -> Result<Robot> {
 ///
 /// # Errors
 /// Those of [`read_log`](crate::log::read_log).
+///
+/// # Example
+/// ```
+/// # use twincal_io::model::parse_model;
+/// # let text = r#"<robot name="pendulum"><link name="base"/><link name="rod"><inertial><origin xyz="0 0 -0.5"/><mass value="1"/>
+/// # <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+/// # <joint name="pivot" type="continuous"><parent link="base"/><child link="rod"/><axis xyz="0 1 0"/></joint></robot>"#;
+/// # let (robot, _) = parse_model("pendulum.urdf", text.as_bytes(), &Default::default())?.robot(&Default::default())?;
+/// # let folder = tempfile::tempdir()?;
+/// # let path = folder.path().join("run1.csv");
+/// std::fs::write(&path, "t,pivot.q,pivot.tau\n0,0.1,0.5\n0.01,0.2,1\n0.02,0.3,1.5\n")?;
+/// let log = twincal_io::read_recording(&path, &robot)?;
+/// assert_eq!(log.time, [0.0, 0.01, 0.02]);
+/// assert_eq!(log.joints[0].q, [0.1, 0.2, 0.3]);
+/// assert_eq!(log.joints[0].tau, Some(vec![0.5, 1.0, 1.5]));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn read_recording(path: impl AsRef<Path>, robot: &Robot) -> Result<Recording> {
     Ok(read_log(path.as_ref(), robot, &LogOptions::default())?.0)
 }
@@ -44,6 +73,19 @@ pub fn read_recording(path: impl AsRef<Path>, robot: &Robot) -> Result<Recording
 ///
 /// # Errors
 /// A folder that is there already; the system's refusal.
+///
+/// # Example
+/// ```
+/// # #[path = "../../twincal/examples/two_link.rs"] mod two_link;
+/// # let folder = tempfile::tempdir()?;
+/// # let folder = folder.path().join("twin");
+/// # let fit = two_link::study()?;
+/// twincal_io::save(&fit, &folder)?;
+/// let result: serde_json::Value = serde_json::from_slice(&std::fs::read(folder.join("result.json"))?)?;
+/// assert_eq!(result["components"].as_array().map(Vec::len), Some(fit.components.len()));
+/// assert!(twincal_io::save(&fit, &folder).is_err()); // nothing is replaced
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn save(calibration: &Calibration, folder: impl AsRef<Path>) -> Result<()> {
     let robot = calibration.twin.robot.description().name.clone();
     let stored = StoredTwin {
@@ -65,6 +107,20 @@ pub fn save(calibration: &Calibration, folder: impl AsRef<Path>) -> Result<()> {
 ///
 /// # Errors
 /// A folder that holds none, a file that is damaged or of another version.
+///
+/// # Example
+/// A twin predicts the same before it was written and after it was read.
+/// ```
+/// # #[path = "../../twincal/examples/two_link.rs"] mod two_link;
+/// # let folder = tempfile::tempdir()?;
+/// # let folder = folder.path().join("twin");
+/// # let fit = two_link::study()?;
+/// # twincal_io::save(&fit, &folder)?;
+/// let again = twincal_io::load(&folder)?;
+/// let (q, qd, qdd) = ([0.3, -0.2], [0.5, 0.1], [-0.2, 0.4]);
+/// assert_eq!(again.twin().torque(&q, &qd, &qdd)?, fit.twin().torque(&q, &qd, &qdd)?);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn load(folder: impl AsRef<Path>) -> Result<Calibration> {
     let stored = StoredTwin::read(&Artifact::open(folder.as_ref())?, false)?;
     Ok(stored.calibration)

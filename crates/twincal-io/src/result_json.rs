@@ -28,6 +28,21 @@ pub const SCHEMA: u64 = 1;
 ///
 /// # Errors
 /// [`Error::Internal`] if the values cannot be written.
+///
+/// # Example
+/// ```
+/// # #[path = "../../twincal/examples/two_link.rs"] mod two_link;
+/// use twincal_io::{context::ReportContext, result_json::result_json};
+///
+/// # let fit = two_link::study()?;
+/// let text = result_json(&fit, &ReportContext::default())?;
+/// let result: serde_json::Value = serde_json::from_str(&text)?;
+/// let components = result["components"].as_array().ok_or("no list")?;
+/// let payload = components.iter().find(|own| own["name"] == "payload").ok_or("none")?;
+/// assert_eq!(payload["status"], "established");
+/// assert!(payload["pip"].as_f64().is_some_and(|pip| pip > 0.99));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn result_json(calibration: &Calibration, context: &ReportContext) -> Result<String> {
     let internal = |e: serde_json::Error| Error::Internal {
         what: crate::artifact::RESULT.into(),

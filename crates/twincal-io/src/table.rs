@@ -76,6 +76,18 @@ impl Values<'_> {
 }
 
 /// Writes a table whose columns are known and whose rows come in blocks; memory is one row group.
+///
+/// # Example
+/// ```
+/// use twincal_io::table::{ColumnKind, TableFormat, TableWriter, Values};
+///
+/// let columns = [("elbow.tau".to_owned(), ColumnKind::Number), ("elbow.outside".to_owned(), ColumnKind::Flag)];
+/// let mut table = TableWriter::new(Vec::new(), TableFormat::Csv, &columns)?;
+/// table.push(&[Values::Numbers(&[1.25, f64::NAN]), Values::Flags(&[false, true])])?;
+/// let text = String::from_utf8(table.finish()?)?;
+/// assert_eq!(text, "elbow.tau,elbow.outside\n1.25,false\n,true\n");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct TableWriter<W: Write + Send> {
     columns: Vec<(String, ColumnKind)>,
     sink: Sink<W>,

@@ -80,6 +80,24 @@ impl<'a> Calibrate<'a> {
     }
 
     /// Is called with each stage before it begins, by the thread that runs; `Break` ends the calibration with [`Error::Cancelled`].
+    ///
+    /// # Example
+    /// The callback ends the calibration at its first stage.
+    /// ```
+    /// # #[path = "../examples/two_link.rs"] mod two_link;
+    /// use std::ops::ControlFlow;
+    /// use twincal::prelude::*;
+    ///
+    /// # let (robot, mut noise) = (two_link::arm(2.0)?, twincal::random::Random::new(1, 0));
+    /// # let log = two_link::log("run1", 0.3, &robot, &mut noise);
+    /// let watch = |stage: Stage| {
+    ///     println!("{stage:?}");
+    ///     ControlFlow::Break(())
+    /// };
+    /// let stopped = Calibrate::new(&robot).logs([log]).progress(watch).run().unwrap_err();
+    /// assert_eq!(stopped.error, Error::Cancelled);
+    /// # Ok::<(), Error>(())
+    /// ```
     #[must_use]
     pub fn progress(mut self, watch: impl Fn(Stage) -> ControlFlow<()> + Send + Sync + 'a) -> Self {
         self.watch = Box::new(watch);

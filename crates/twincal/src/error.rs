@@ -12,6 +12,17 @@ use serde::{Deserialize, Serialize};
 pub type Result<T> = std::result::Result<T, Error>;
 
 /// Why the mathematics cannot go on. Every message names the culprit, the number and the remedy.
+///
+/// # Example
+/// ```
+/// use twincal::prelude::*;
+///
+/// let log = Recording::new("run1", [0.0, 0.1, 0.2]);
+/// let error = log.joint([1.0; 3], [0.0; 2]).unwrap_err();
+/// assert!(matches!(&error, Error::Log { log, .. } if log == "run1"));
+/// assert_eq!(error.remedy(), Some("give one value for each stamp, NaN where it is not known"));
+/// println!("{error}"); // culprit, numbers and remedy in one sentence
+/// ```
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -155,6 +166,13 @@ impl Error {
 }
 
 /// How much a [`Finding`] matters.
+///
+/// # Example
+/// ```
+/// use twincal::Severity;
+///
+/// assert!(Severity::Note < Severity::Warning && Severity::Warning < Severity::Degraded);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Severity {
@@ -167,6 +185,22 @@ pub enum Severity {
 }
 
 /// Something was dropped, changed, assumed or looks wrong. Shown in terminal, JSON and report; never silent.
+///
+/// # Example
+/// The outer link of this arm has no mass. Programs read code, subject and severity; people read the message.
+/// ```
+/// # #[path = "../examples/two_link.rs"] mod two_link;
+/// use std::collections::BTreeMap;
+/// use twincal::robot::Robot;
+/// use twincal::{Code, Severity};
+///
+/// # let description = two_link::arm(0.0)?.description().clone();
+/// let (_, findings) = Robot::new(description, &BTreeMap::new())?;
+/// let massless = findings.iter().find(|finding| finding.code == Code::MovesNoMass).ok_or("none")?;
+/// assert_eq!((massless.subject.as_str(), massless.severity), ("elbow", Severity::Warning));
+/// println!("{}", massless.message);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Finding {
     /// What it says, for programs.

@@ -203,6 +203,16 @@ impl Prior {
     /// ```
     ///
     /// The odds of a component alone are `1/b_f`: r_f times those of a family with r = 1, whatever r_f is.
+    ///
+    /// # Example
+    /// Of ten components one is expected: the first is in with probability 0.1, the second with 2/11 once the first is in.
+    /// ```
+    /// use twincal::prior::{Inclusion, Prior};
+    ///
+    /// let prior = Prior::single(vec![1.0; 10], vec![0; 10], Inclusion::ExpectedTerms(1.0), (1.0, 1.0));
+    /// assert!((prior.next(0, 0, 0).0 - 0.1).abs() < 1e-12); // family 0, none in, none decided
+    /// assert!((prior.next(0, 1, 1).0 - 2.0 / 11.0).abs() < 1e-12);
+    /// ```
     pub fn next(&self, family: usize, included: usize, seen: usize) -> (f64, f64) {
         let odds = self.odds[family];
         match self.inclusion {

@@ -14,6 +14,23 @@ pub(super) const MAX_MANIFEST: u64 = 16 << 20;
 const MAX_FILE: u64 = 4 << 30;
 
 /// An artefact whose manifest has been read; each file is verified when it is read.
+///
+/// # Example
+/// ```
+/// # #[path = "../../../twincal/examples/two_link.rs"] mod two_link;
+/// use twincal_io::artifact::{Artifact, Maker};
+///
+/// # let folder = tempfile::tempdir()?;
+/// # let folder = folder.path().join("twin");
+/// # twincal_io::save(&two_link::study()?, &folder)?;
+/// let artifact = Artifact::open(&folder)?;
+/// assert_eq!(artifact.made_by(), Maker::Fit);
+/// assert!(artifact.names().any(|name| name == "twin.json"));
+/// assert!(artifact.read("result.json")?.starts_with(b"{"));
+/// std::fs::write(folder.join("result.json"), "{}")?;
+/// assert!(artifact.read("result.json").is_err()); // the checksum is another one
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Artifact {
     folder: PathBuf,

@@ -43,6 +43,20 @@ use toml::de::{DeTable, DeValue};
 pub const SIZE_LIMIT: u64 = 1 << 20;
 
 /// A config and where it came from.
+///
+/// # Example
+/// ```
+/// use twincal::term::Family;
+/// use twincal_io::config::Config;
+///
+/// let text = "[library]\nfamilies = [\"viscous\", \"coulomb\"]\n[inference]\nseed = 7\n";
+/// let settings = Config::parse("twincal.toml", text)?.settings()?.calibration;
+/// assert_eq!(settings.library.families, [Family::Viscous, Family::Coulomb]);
+/// assert_eq!(settings.inference.seed, 7);
+/// let error = Config::parse("twincal.toml", "[library]\nfamilys = []\n").unwrap_err();
+/// assert!(error.to_string().starts_with("twincal.toml:2:1: "));
+/// # Ok::<(), twincal_io::Error>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Config {
     /// The keys; flags may be written into it.

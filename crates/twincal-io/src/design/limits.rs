@@ -145,6 +145,17 @@ pub fn limits_schema() -> String {
 ///
 /// # Errors
 /// A file that cannot be read, wrong TOML, an unknown key or a wrong type, with line and column.
+///
+/// # Example
+/// ```
+/// # let folder = tempfile::tempdir()?;
+/// # let path = folder.path().join("limits.toml");
+/// std::fs::write(&path, "[joint.elbow]\nposition = [-2.0, 2.0]\nvelocity = 1.5\n")?;
+/// let limits = twincal_io::design::read_limits(&path)?; // for `twincal::design::joint_limits`
+/// assert_eq!(limits.joints["elbow"].position, Some([-2.0, 2.0]));
+/// assert_eq!(limits.joints["elbow"].acceleration, None); // velocity / 0.2 s then
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn read_limits(path: &Path) -> Result<Limits> {
     let name = path.display().to_string();
     let bytes = InputFile::new(path, MAX_BYTES)

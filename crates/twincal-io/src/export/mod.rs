@@ -22,6 +22,27 @@ const NO_BODY: &str = "<!-- twincal: the inertia that was found here is physical
 /// # Errors
 /// [`Error::Content`] at the place in the file that cannot hold a change; [`Error::Internal`] if what was written does not
 /// read back as what was meant.
+///
+/// # Example
+/// `text` is the URDF of a pendulum of 1 kg. Its mass changes, and with it one number of the file.
+/// ```
+/// use twincal::write_back::{LinkChange, WriteBack};
+/// use twincal_io::export::write_model;
+/// use twincal_io::model::parse_model;
+///
+/// # let text = r#"<robot name="pendulum"><link name="base"/><link name="rod"><inertial><origin xyz="0 0 -0.5"/><mass value="1"/>
+/// # <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+/// # <joint name="pivot" type="continuous"><parent link="base"/><child link="rod"/><axis xyz="0 1 0"/></joint></robot>"#;
+/// let model = parse_model("pendulum.urdf", text.as_bytes(), &Default::default())?;
+/// let before = model.description.links[1].inertia;
+/// let mut after = before.ok_or("no inertia")?;
+/// after.mass = 1.5;
+/// let link = LinkChange { link: "rod".into(), before, after, no_body: false }; // as of `twincal::write_back::Writer`
+/// let change = WriteBack { links: vec![link], ..WriteBack::default() };
+/// let written = String::from_utf8(write_model(&model, &change)?)?;
+/// assert_eq!(written, text.replace("<mass value=\"1\"/>", "<mass value=\"1.5\"/>"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn write_model(model: &Model, change: &WriteBack) -> Result<Vec<u8>> {
     let bytes = match model.format() {
         ModelFormat::Urdf => urdf::write(model, change)?,

@@ -38,6 +38,22 @@ impl Column {
 ///
 /// # Errors
 /// Like [`super::read_log`]; columns of different lengths, and channels that are no numbers.
+///
+/// # Example
+/// ```
+/// use twincal_io::log::{Column, LogOptions, read_columns};
+///
+/// # use twincal_io::model::parse_model;
+/// # let text = r#"<robot name="pendulum"><link name="base"/><link name="rod"><inertial><origin xyz="0 0 -0.5"/><mass value="1"/>
+/// # <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+/// # <joint name="pivot" type="continuous"><parent link="base"/><child link="rod"/><axis xyz="0 1 0"/></joint></robot>"#;
+/// # let (robot, _) = parse_model("pendulum.urdf", text.as_bytes(), &Default::default())?.robot(&Default::default())?;
+/// let header = ["t", "pivot.q", "pivot.tau"].map(String::from);
+/// let columns = [[0.0, 0.01], [0.1, 0.2], [0.5, 1.0]].map(|values| Column::Numbers(values.to_vec()));
+/// let (log, _) = read_columns("run1", &header, &columns, &robot, &LogOptions::default())?;
+/// assert_eq!((&*log.name, &log.joints[0].q[..]), ("run1", &[0.1, 0.2][..]));
+/// # Ok::<(), twincal_io::Error>(())
+/// ```
 pub fn read_columns(
     name: &str,
     header: &[String],

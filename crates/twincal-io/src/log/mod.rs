@@ -108,6 +108,28 @@ impl LogOptions {
 /// # Errors
 /// [`Error::System`] if the file cannot be read; [`Error::Content`] with `file:line[:column]` for everything in it that cannot
 /// be understood: empty, UTF-16, ragged rows, text in numbers, columns that are duplicate, missing or without any number.
+///
+/// # Example
+/// A table without time stamps that was logged at 100 Hz.
+/// ```
+/// use twincal_io::log::{LogOptions, read_log};
+///
+/// # use twincal_io::model::parse_model;
+/// # let text = r#"<robot name="pendulum"><link name="base"/><link name="rod"><inertial><origin xyz="0 0 -0.5"/><mass value="1"/>
+/// # <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+/// # <joint name="pivot" type="continuous"><parent link="base"/><child link="rod"/><axis xyz="0 1 0"/></joint></robot>"#;
+/// # let (robot, _) = parse_model("pendulum.urdf", text.as_bytes(), &Default::default())?.robot(&Default::default())?;
+/// # let folder = tempfile::tempdir()?;
+/// # let path = folder.path().join("run1.csv");
+/// std::fs::write(&path, "pivot.q,pivot.tau\n0.1,0.5\n0.2,1\n0.3,1.5\n")?;
+/// let options = LogOptions { rate_hz: Some(100.0), ..LogOptions::default() };
+/// let (log, findings) = read_log(&path, &robot, &options)?;
+/// assert!((log.time[2] - log.time[0] - 0.02).abs() < 1e-12);
+/// for finding in &findings {
+///     println!("{}", finding.message);
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn read_log(
     path: &Path,
     robot: &Robot,

@@ -157,6 +157,28 @@ impl Model {
 /// # Errors
 /// [`Error`] with file, line and column: not readable, too large, not XML, a kind of joint that twincal does not
 /// support, a number that is none, a format that must be converted first.
+///
+/// # Example
+/// A pendulum on the moon; `path` is its URDF.
+/// ```
+/// use twincal_io::model::{ModelFormat, ModelSettings, read_model};
+///
+/// # let text = r#"<robot name="pendulum"><link name="base"/><link name="rod"><inertial><origin xyz="0 0 -0.5"/><mass value="1"/>
+/// # <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+/// # <joint name="pivot" type="continuous"><parent link="base"/><child link="rod"/><axis xyz="0 1 0"/></joint></robot>"#;
+/// # let folder = tempfile::tempdir()?;
+/// # let path = folder.path().join("arm.urdf");
+/// # std::fs::write(&path, text)?;
+/// let settings = ModelSettings { gravity: Some([0.0, 0.0, -1.62]), ..ModelSettings::default() };
+/// let model = read_model(&path, &settings)?;
+/// assert_eq!((model.format(), model.robot_name()), (ModelFormat::Urdf, "pendulum"));
+/// let (robot, findings) = model.robot(&Default::default())?; // no joint locked
+/// assert_eq!(robot.description().gravity[2], -1.62);
+/// for finding in &findings {
+///     println!("{}", finding.message); // what the file left to be assumed
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn read_model(path: &Path, settings: &ModelSettings) -> Result<Model> {
     let name = path.display().to_string();
     refuse_by_extension(&name, path)?;

@@ -42,6 +42,20 @@ pub const MENTIONED: f64 = 0.05;
 ///
 /// # Errors
 /// [`Error::Internal`] if the template and the values that fill it do not fit together.
+///
+/// # Example
+/// ```
+/// # #[path = "../../../twincal/examples/two_link.rs"] mod two_link;
+/// use twincal_io::{context::ReportContext, report::render};
+///
+/// # let fit = two_link::study()?;
+/// let context = ReportContext { model: "arm.urdf".into(), ..ReportContext::default() };
+/// let page = render(&fit, &context)?;
+/// assert!(page.trim_start().starts_with("<!DOCTYPE html>") && page.contains("payload"));
+/// assert!(!page.contains("src=\"http")); // it needs no network
+/// assert_eq!(page, render(&fit, &context)?);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn render(calibration: &Calibration, context: &ReportContext) -> Result<String> {
     page::fill(calibration, context).map_err(|error| Error::Internal {
         what: "report template".into(),

@@ -30,6 +30,32 @@ const COLUMNS: [&str; 2] = ["log", "value"];
 const MAX_BYTES: u64 = 16 << 30;
 
 /// Statistics with the model file that their robot was read from.
+///
+/// # Example
+/// ```
+/// # #[path = "../../../twincal/examples/two_link.rs"] mod two_link;
+/// # use twincal::calibrate::{Statistics, plan};
+/// # use twincal::prelude::*;
+/// use twincal_io::statistics::{ModelFile, StatisticsFile};
+///
+/// # let (robot, mut noise) = (two_link::arm(2.0)?, twincal::random::Random::new(1, 0));
+/// # let log = two_link::log("run1", 0.3, &two_link::arm(2.6)?, &mut noise);
+/// # let mut settings = Settings::default();
+/// # settings.library.families = vec![Family::Payload, Family::Viscous];
+/// # let (plan, _) = plan(&robot, std::slice::from_ref(&log), &settings, &|_| {})?;
+/// # let statistics = Statistics::of(("arm", &robot), &plan, &Log::from(&log), "")?;
+/// # let folder = tempfile::tempdir()?;
+/// # let path = folder.path().join("run1.arrow");
+/// # let model = ModelFile {
+/// #     name: "arm.urdf".into(), stored_as: "model.urdf".into(), robot: "arm".into(), text: "<robot/>".into(), findings: Vec::new(),
+/// # };
+/// let file = StatisticsFile { statistics, model };
+/// file.write_to(std::fs::File::create(&path)?)??;
+/// let again = StatisticsFile::read(&path)?;
+/// assert_eq!(again, file);
+/// assert!(again.statistics.log_names().eq(["run1"]));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct StatisticsFile {
     /// What a fit takes.

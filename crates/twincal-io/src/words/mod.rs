@@ -75,10 +75,19 @@ pub struct Answer {
 /// What may be concluded from a calibration, in words.
 ///
 /// # Example
-/// ```no_run
-/// let twin = twincal_io::load("twincal-out")?;
-/// println!("{}", twincal_io::words::answer(&twin).headline);
-/// # Ok::<(), twincal_io::error::Error>(())
+/// ```
+/// # #[path = "../../../twincal/examples/two_link.rs"] mod two_link;
+/// use twincal::assess::{Answer, assess};
+/// use twincal_io::words::answer;
+///
+/// # let fit = two_link::study()?;
+/// let words = answer(&fit); // sentences for the values of `assess`
+/// assert_eq!(words.answer, assess(&fit).answer);
+/// assert!(words.answer <= Answer::YesWithinLimits && !words.headline.is_empty());
+/// for limit in &words.limits {
+///     println!("{limit}");
+/// }
+/// # Ok::<(), twincal::Error>(())
 /// ```
 #[must_use]
 pub fn answer(calibration: &Calibration) -> Answer {

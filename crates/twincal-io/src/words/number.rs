@@ -61,6 +61,15 @@ pub(crate) fn with_ends(x: f64, ends: [f64; 2]) -> String {
 }
 
 /// A probability with three decimals that never rounds to certainty: 0.9991 and 1 are ">0.999".
+///
+/// # Example
+/// ```
+/// use twincal_io::words::probability;
+///
+/// assert_eq!(probability(0.5), "0.500");
+/// assert_eq!(probability(1.0), ">0.999");
+/// assert_eq!(probability(f64::NAN), "–");
+/// ```
 #[must_use]
 pub fn probability(p: f64) -> String {
     match p {

@@ -173,6 +173,28 @@ impl Statistics {
     /// # Errors
     /// [`Error::Statistics`] for another plan, version or robot, for a log that is there already, under this or another name, and for logs of
     /// one robot that overlap in time (by absolute stamps); then nothing was added.
+    ///
+    /// # Example
+    /// A log adds once: the second time it is refused.
+    /// ```
+    /// # #[path = "../../examples/two_link.rs"] mod two_link;
+    /// use twincal::calibrate::{Statistics, plan};
+    /// use twincal::prelude::*;
+    ///
+    /// # let (robot, mut noise) = (two_link::arm(2.0)?, twincal::random::Random::new(1, 0));
+    /// # let logs = [("run1", 0.3), ("run2", 1.1)];
+    /// # let real = two_link::arm(2.6)?;
+    /// # let logs = logs.map(|(name, phase)| two_link::log(name, phase, &real, &mut noise));
+    /// # let mut settings = Settings::default();
+    /// # settings.library.families = vec![Family::Payload, Family::Viscous];
+    /// # let (plan, _) = plan(&robot, &logs[..1], &settings, &|_| {})?;
+    /// let of = |log: &Recording| Statistics::of(("arm", &robot), &plan, &Log::from(log), "");
+    /// let (mut sum, other) = (of(&logs[0])?, of(&logs[1])?);
+    /// sum.try_merge(&other)?;
+    /// assert!(sum.log_names().eq(["run1", "run2"]));
+    /// assert!(sum.try_merge(&other).is_err());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn try_merge(&mut self, other: &Self) -> Result<()> {
         require_same(self.common(), other.common())?;
         let logs = self.logs.iter().chain(&other.logs);

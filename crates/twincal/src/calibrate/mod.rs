@@ -70,6 +70,25 @@ use std::sync::Arc;
 /// what was found before.
 /// # Source
 /// paper eq. (1)–(5); method sections 1–8.
+///
+/// # Example
+/// Logs may be lent or given away; [`Calibrate`](crate::builder::Calibrate) is the same step by step.
+/// ```
+/// # #[path = "../../examples/two_link.rs"] mod two_link;
+/// use twincal::calibrate::{CalibrationSettings, calibrate};
+/// use twincal::term::Family;
+///
+/// # let (robot, real, mut noise) = (two_link::arm(2.0)?, two_link::arm(2.6)?, twincal::random::Random::new(1, 0));
+/// # let mut log = |name: &str, phase: f64| two_link::log(name, phase, &real, &mut noise);
+/// # let (training, heldout) = (log("training", 0.3), log("held-out", 1.9));
+/// let mut settings = CalibrationSettings::default();
+/// settings.library.families = vec![Family::Payload, Family::Viscous];
+/// settings.library.terms = vec!["sin(q1 - q2)".into()];
+/// let fit = calibrate(&robot, &[training], &[heldout], &settings, &|stage| println!("{stage:?}"))?;
+/// let payload = fit.effects().find(|effect| effect.name() == "payload").ok_or("none")?;
+/// assert!((payload.parameters()[0].mean - 0.6).abs() < 0.05); // kg more than in the model file
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn calibrate<'a>(
     robot: &Robot,
     logs: impl Into<Logs<'a>>,
@@ -91,6 +110,25 @@ pub fn calibrate<'a>(
 ///
 /// # Errors
 /// Those of [`calibrate`].
+///
+/// # Example
+/// ```
+/// # #[path = "../../examples/two_link.rs"] mod two_link;
+/// use twincal::calibrate::plan;
+/// use twincal::prelude::*;
+///
+/// # let (robot, mut noise) = (two_link::arm(2.0)?, twincal::random::Random::new(1, 0));
+/// # let logs = [two_link::log("run1", 0.3, &two_link::arm(2.6)?, &mut noise)];
+/// let mut settings = Settings::default();
+/// settings.library.families = vec![Family::Payload, Family::Viscous];
+/// settings.signal.cutoff_hz = Auto::Value(5.0);
+/// let (plan, _) = plan(&robot, &logs, &settings, &|_| {})?;
+/// assert_eq!(plan.pipeline.cutoff_hz, 5.0);
+/// assert!(plan.require_for(&robot).is_ok());
+/// # let another_robot = two_link::arm(2.6)?;
+/// assert!(plan.require_for(&another_robot).is_err());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn plan<'a>(
     robot: &Robot,
     logs: impl Into<Logs<'a>>,

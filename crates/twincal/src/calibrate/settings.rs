@@ -9,6 +9,18 @@ use crate::signal::{Auto, Corrections, SignalSettings};
 use crate::term::{Family, LibrarySettings};
 
 /// Everything a calibration can be told; each field but the last four is a table of `twincal.toml`.
+///
+/// # Example
+/// Friction alone, and a filter at 5 Hz; everything else stays as an empty `twincal.toml` has it.
+/// ```
+/// use twincal::prelude::*;
+///
+/// let mut settings = Settings::default(); // the prelude's name of it
+/// settings.library.families.retain(|family| family.is_friction());
+/// settings.signal.cutoff_hz = Auto::Value(5.0);
+/// assert_eq!(settings.library.families.len(), 9);
+/// assert_eq!((settings.inference.chains, settings.inference.draws), (4, 5000));
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct CalibrationSettings {
     /// `[library]`.

@@ -197,6 +197,23 @@ pub fn surest(parameters: &[ParameterChange]) -> Vec<&ParameterChange> {
 ///
 /// # Errors
 /// [`Error::Setting`] with the key `twin` if the twins belong to different robots or a twin is damaged.
+///
+/// # Example
+/// A load of 0.6 kg at the tip is what changed.
+/// ```
+/// # #[path = "../../examples/two_link.rs"] mod two_link;
+/// use twincal::compare::compare;
+/// # use twincal::prelude::*;
+/// # let (after, robot, mut noise) = (two_link::study()?, two_link::arm(2.0)?, twincal::random::Random::new(11, 0));
+/// # let mut settings = Settings { library: after.twin().library.clone(), ..Settings::default() };
+/// # settings.signal.cutoff_hz = Auto::Value(0.0);
+/// # let log = two_link::log("without", 0.3, &robot, &mut noise);
+/// # let before = Calibrate::new(&robot).logs([log]).settings(settings).run()?;
+/// let changes = compare(&before, &after)?;
+/// let payload = changes.iter().find(|change| change.name == "payload").ok_or("none")?;
+/// assert!(payload.changed && (payload.parameters[0].difference - 0.6).abs() < 0.02); // kg
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn compare(before: &Calibration, after: &Calibration) -> Result<Vec<Change>> {
     let components = [&before.components, &after.components];
     let (before, after) = (&before.twin, &after.twin);

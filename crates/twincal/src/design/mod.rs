@@ -143,6 +143,31 @@ pub struct Design {
 /// # Errors
 /// [`Error::Setting`] for a duration or rate that is no positive number or too short, [`Error::Refused`] where torque or clearance forbid the
 /// start, naming the constraint, and any other error of `watch`.
+///
+/// # Example
+/// Eight seconds that show the friction of both joints, from rest to rest within all limits.
+/// ```
+/// # #[path = "../../examples/two_link.rs"] mod two_link;
+/// use twincal::design::{DesignSettings, StatedLimits, Task, design, joint_limits};
+/// # use twincal::term::{Family, Library, LibrarySettings};
+///
+/// # let robot = two_link::arm(2.0)?;
+/// # let settings = LibrarySettings { generic: Some(false), families: vec![Family::Viscous, Family::Coulomb], ..Default::default() };
+/// # let (library, _) = Library::propose(&robot, &settings)?;
+/// let own = StatedLimits { position: Some([-1.1, 1.3]), velocity: Some(1.7), ..Default::default() };
+/// let stated = robot.joint_names().into_iter().map(|name| (name.to_owned(), own)).collect();
+/// let limits = joint_limits(&robot, &stated)?;
+/// let task = Task {
+///     robot: &robot, library: &library, questions: None, recorded: None, limits: &limits, torque: None, clearance: None,
+/// };
+/// let settings = DesignSettings { duration: 8.0, rate: 250.0, proposals: 200, steps: 20, ..Default::default() };
+/// let found = design(&task, &settings, &|_| Ok(()))?;
+/// let (motion, last) = (&found.motion, found.motion.len - 1);
+/// assert_eq!(last, 8 * 250);
+/// assert!(motion.qd[0].abs() < 1e-9 && motion.qd[last].abs() < 1e-9);
+/// assert!(motion.q.iter().all(|q| (-1.1..=1.3).contains(q)) && motion.qd.iter().all(|qd| qd.abs() <= 1.7));
+/// # Ok::<(), twincal::Error>(())
+/// ```
 pub fn design(
     task: &Task<'_>,
     settings: &DesignSettings,

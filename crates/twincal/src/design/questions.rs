@@ -25,6 +25,21 @@ const ACTIVE: f64 = 0.02;
 /// Weight of ln det A beside the questions.
 const REST: f64 = 0.02;
 /// What is asked of a posterior.
+///
+/// # Example
+/// Effects are asked by name. Without names every effect with a probability between 0.05 and 0.95 is a question.
+/// ```
+/// # #[path = "../../examples/two_link.rs"] mod two_link;
+/// use twincal::design::Questions;
+///
+/// # let fit = two_link::study()?;
+/// let problem = fit.problem.as_ref().ok_or("a twin of a fleet has none")?;
+/// let (library, rate) = (fit.twin().library()?, fit.kept_rate_hz());
+/// let ask = |name: &str| Questions::new((problem, fit.twin()), (&library, rate), &[name.to_owned()]);
+/// assert!(ask("elbow.viscous")?.names().eq(["elbow.viscous"])); // for `Task::questions`
+/// assert!(ask("wrist.viscous").is_err());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug)]
 pub struct Questions<'a> {
     pub(super) problem: &'a Problem,

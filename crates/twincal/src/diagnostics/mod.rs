@@ -39,6 +39,17 @@ fn halves<C: AsRef<[f64]>>(chains: &[C]) -> Option<Vec<&[f64]>> {
 ///
 /// NaN for fewer than 2 chains, fewer than 4 draws, or draws that are all equal; ∞ for chains that each stand still at
 /// different values.
+///
+/// # Example
+/// Two chains over the same range agree. A shifted chain does not.
+/// ```
+/// use twincal::diagnostics::r_hat;
+///
+/// let chain = |step: u32, shift: f64| -> Vec<f64> { (0..100).map(|i| shift + f64::from(step * i % 100)).collect() };
+/// assert!(r_hat(&[chain(37, 0.0), chain(43, 0.0)]) < 1.01);
+/// assert!(r_hat(&[chain(37, 0.0), chain(43, 1000.0)]) > 1.5);
+/// assert!(r_hat(&[chain(37, 0.0)]).is_nan()); // one chain says nothing
+/// ```
 pub fn r_hat<C: AsRef<[f64]>>(chains: &[C]) -> f64 {
     let Some(halves) = halves(chains).filter(|_| chains.len() >= 2) else {
         return f64::NAN;

@@ -45,6 +45,22 @@ pub struct EvaluatorJoint {
 }
 
 /// A program: `torque[j]` and `variance[j]` are the steps that hold joint j's.
+///
+/// # Example
+/// The program computes the torque that the twin predicts.
+/// ```
+/// # #[path = "../../examples/two_link.rs"] mod two_link;
+/// use twincal::evaluator::Evaluator;
+///
+/// # let fit = two_link::study()?;
+/// let program = Evaluator::new(fit.twin(), None)?;
+/// let (q, qd, qdd) = ([0.2, -0.4], [0.5, 0.3], [1.0, -1.0]);
+/// let (torque, _) = program.evaluate(&q, &qd, &qdd);
+/// let predicted = fit.twin().torque(&q, &qd, &qdd)?.mean;
+/// assert!((0..2).all(|joint| (torque[joint] - predicted[joint]).abs() < 1e-9));
+/// println!("{} steps", program.steps.len());
+/// # Ok::<(), twincal::Error>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Evaluator {
     /// Joints in the twin's order.

@@ -60,6 +60,36 @@ impl Default for FleetSettings {
 }
 
 /// The statistics of many robots' logs, added one by one: of each only what the posterior needs is kept.
+///
+/// # Example
+/// Seven arms of one type, each with about 0.6 kg more at its tip than the model file of all says.
+/// ```
+/// # #[path = "../../examples/two_link.rs"] mod two_link;
+/// use twincal::calibrate::{About, Statistics, plan_about};
+/// use twincal::fleet::{Fleet, FleetSettings};
+/// use twincal::prelude::*;
+///
+/// # let (robot, mut noise) = (two_link::arm(2.0)?, twincal::random::Random::new(4, 0));
+/// # let mut logs = Vec::new();
+/// # for unit in 0..7 {
+/// #     let real = two_link::arm(2.6 + 0.01 * (f64::from(unit) - 3.0))?;
+/// #     logs.push(two_link::log(&format!("unit{unit}"), 0.3 + 0.7 * f64::from(unit), &real, &mut noise));
+/// # }
+/// # let mut settings = Settings::default();
+/// # settings.library.families = vec![Family::Payload, Family::Viscous, Family::Coulomb];
+/// # settings.library.terms = vec!["sin(q1 - q2)".into()];
+/// let (plan, _) = plan_about(About::Found, &robot, &logs[..1], &settings, &|_| {})?;
+/// let mut fleet = Fleet::default();
+/// for log in &logs {
+///     fleet.add(&Statistics::of((&log.name, &robot), &plan, &Log::from(log), "")?); // each where its log is
+/// }
+/// let settings = FleetSettings { calibration: settings, draws: 100, ..FleetSettings::default() };
+/// let result = fleet.fit(&settings, &|_| Ok(()))?;
+/// let payload = result.type_effects.iter().find(|effect| effect.name == "payload").ok_or("none")?;
+/// assert!(payload.pip > 0.99 && (payload.parameters[0].value - 0.6).abs() < 0.05); // kg
+/// assert_eq!(result.units.len(), 7);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, Default)]
 pub struct Fleet {
     families: Vec<Family>,

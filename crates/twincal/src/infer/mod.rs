@@ -83,6 +83,27 @@ pub fn bytes_of_chains(components: usize, columns: usize, settings: &InferenceSe
 /// # Errors
 /// [`crate::Error::Setting`] for an impossible setting, [`crate::Error::NotFinite`] naming the column,
 /// [`crate::Error::Refused`] when chains disagree.
+///
+/// # Example
+/// One column that may be in or out: the posterior odds in closed form, with A = G + 1/v and the gain r²/A of the fit.
+/// ```
+/// use twincal::infer::{Choice, InferenceSettings, infer};
+/// use twincal::posterior::Problem;
+/// use twincal::prior::{Inclusion, Prior};
+///
+/// let (g, r, yy, n, v, a0, b0) = (40.0_f64, 12.0_f64, 10.0, 40.0, 1.0, 2.0, 0.5);
+/// let problem = Problem {
+///     gram: vec![g], xy: vec![r], yy, n, log_constant: 0.0, names: vec!["x".into()],
+///     prior: Prior::single(vec![v], vec![0], Inclusion::Probability(0.5), (a0, b0)),
+/// };
+/// let settings = InferenceSettings { method: Choice::Exact, chains: 2, draws: 100, seed: 1, allow_disagreement: false };
+/// let posterior = infer(&problem, &settings)?;
+/// let a = g + 1.0 / v;
+/// let odds = (v * a).powf(-0.5) * ((b0 + yy / 2.0) / (b0 + (yy - r * r / a) / 2.0)).powf(a0 + n / 2.0);
+/// assert!((posterior.inclusion[0] - odds / (1.0 + odds)).abs() < 1e-9);
+/// assert!((posterior.mean[0] - posterior.inclusion[0] * r / a).abs() < 1e-9); // over both models
+/// # Ok::<(), twincal::Error>(())
+/// ```
 pub fn infer(problem: &Problem, settings: &InferenceSettings) -> Result<Posterior> {
     checked(problem, by_method(problem, None, settings)?)
 }

@@ -41,6 +41,23 @@ impl<'a> Drawer<'a> {
     ///
     /// Draw `i` depends only on `seed`, `stream` and the draws before it, never on threads. A posterior without models (it
     /// cannot come from inference) gives no draws.
+    ///
+    /// # Example
+    /// Mean and spread of the draws are those of the posterior; the same seed gives the same draws.
+    /// ```
+    /// # #[path = "../../examples/two_link.rs"] mod two_link;
+    /// use twincal::posterior::draws::draw;
+    ///
+    /// # let fit = two_link::study()?;
+    /// let posterior = &fit.twin().posterior;
+    /// let draws = draw(posterior, 4000, 1, 0);
+    /// let hidden: Vec<f64> = draws.beta.iter().step_by(draws.columns).copied().collect(); // column 0
+    /// let mean = hidden.iter().sum::<f64>() / 4000.0;
+    /// let sd = posterior.sd[0] / 4000_f64.sqrt(); // of that mean
+    /// assert!((mean - posterior.mean[0]).abs() < 5.0 * sd);
+    /// assert_eq!(draw(posterior, 4000, 1, 0), draws);
+    /// # Ok::<(), twincal::Error>(())
+    /// ```
     #[must_use]
     pub fn draw(&self, count: usize, seed: u64, stream: u64) -> CoefficientDraws {
         self.draw_given(|_| true, count, seed, stream)

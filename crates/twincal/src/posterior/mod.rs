@@ -138,6 +138,19 @@ pub enum Method {
 }
 
 /// The posterior over models, coefficients and noise.
+///
+/// # Example
+/// Weights of the models sum to 1. Column 0 is a hidden term of 0.8 sin(q1 − q2), which nearly all of them contain.
+/// ```
+/// # #[path = "../../examples/two_link.rs"] mod two_link;
+/// # let fit = two_link::study()?;
+/// let posterior = &fit.twin().posterior;
+/// let all: f64 = posterior.models.iter().map(|model| model.weight).sum();
+/// assert!((all - 1.0).abs() < 1e-9);
+/// assert!((posterior.mean[0] - 0.8).abs() < 0.02 && posterior.inclusion[0] > 0.99);
+/// assert!(posterior.any(&[posterior.component[0]]) > 0.99); // at least one of these components
+/// # Ok::<(), twincal::Error>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Posterior {
     /// Component of each column (0..C), K.

@@ -76,6 +76,31 @@ pub struct Regressed {
 /// [`Error::Setting`] for lengths that do not fit together, groups with a gap and numbers that are not finite; those of [`infer`].
 /// # Source
 /// paper eq. (5); method sections 5–7; misfit along decoys: [`crate::plug_in`].
+///
+/// # Example
+/// `y` follows the first column. The second one is orthogonal to `y`: its probability is 1/(1 + √(1 + v n)) whatever the noise is.
+/// ```
+/// # use twincal::infer::{Choice, InferenceSettings};
+/// use twincal::likelihood::NoiseModel;
+/// # use twincal::prior::{Inclusion, PriorSettings};
+/// use twincal::regression::{Design, Settings, regress};
+/// # use twincal::signal::Auto;
+///
+/// # let inference = InferenceSettings { method: Choice::Exact, chains: 2, draws: 100, seed: 1, allow_disagreement: false };
+/// let square = |period: usize| (0..64).map(move |row| if row % period < period / 2 { 1.0 } else { -1.0 });
+/// let x: Vec<f64> = square(2).chain(square(4)).collect();
+/// let y: Vec<f64> = square(2).zip(square(8)).map(|(x, rest)| 2.0 * x + 0.1 * rest).collect();
+/// # let prior = PriorSettings {
+/// #     scaled_variance: Auto::Value(100.0), inclusion: Some(Inclusion::Probability(0.5)), noise: Some((2.0, 0.5)),
+/// #     families: Vec::new(), forced: Vec::new(), heredity: None,
+/// # };
+/// // v = 100, both columns with probability ½
+/// let settings = Settings { groups: vec![0, 1], noise: NoiseModel::Iid, intercept: false, prior, inference };
+/// let found = regress(Design { x: &x, y: &y, breaks: &[], decoys: &[] }, &settings)?;
+/// assert!((found.posterior.mean[0] - 2.0).abs() < 0.001 && found.posterior.inclusion[0] > 0.99);
+/// assert!((found.posterior.inclusion[1] - 1.0 / (1.0 + (1.0 + 100.0 * 64.0_f64).sqrt())).abs() < 1e-9);
+/// # Ok::<(), twincal::Error>(())
+/// ```
 pub fn regress(design: Design<'_>, settings: &Settings) -> Result<Regressed> {
     check(&design, settings)?;
     let rows = Rows::new(&design, settings.intercept);

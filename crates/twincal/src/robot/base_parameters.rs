@@ -49,6 +49,24 @@ pub struct BaseParameters {
 ///
 /// # Source
 /// Gautier 1991 (numerical base parameters by QR); Gram–Schmidt with pivoting, twice for orthogonality.
+///
+/// # Example
+/// A planar arm of two links of 0.5 m has six base parameters. A mass on the elbow's axis acts like a first and a second moment of the upper
+/// link: one of these three columns depends on the others.
+/// ```
+/// # #[path = "../../examples/two_link.rs"] mod two_link;
+/// use twincal::robot::base_parameters;
+///
+/// # let robot = two_link::arm(2.0)?;
+/// let base = base_parameters(&robot);
+/// assert_eq!(base.count, 6);
+/// assert_eq!(base.dependent[0].name, "upper.Izz"); // 4 · fore.m − 2 · upper.mcx
+/// for (independent, weight) in &base.dependent[0].combination {
+///     println!("{weight:+.2} {}", base.names[*independent]);
+/// }
+/// assert!(base.unidentifiable.contains(&"upper.m".to_owned())); // a mass on a fixed axis has no torque
+/// # Ok::<(), twincal::Error>(())
+/// ```
 pub fn base_parameters(robot: &Robot) -> BaseParameters {
     let bodies = robot.bodies.len();
     let mut columns = link_columns(robot);

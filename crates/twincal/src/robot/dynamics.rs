@@ -38,6 +38,20 @@ impl Workspace {
 /// If a slice is shorter than dof or the workspace belongs to a robot with fewer bodies.
 /// # Source
 /// method section 1; `recursion.rs`.
+///
+/// # Example
+/// Two links of 0.5 m, stretched out: 3 kg at the elbow and 2 kg at the tip are held against gravity.
+/// ```
+/// # #[path = "../../examples/two_link.rs"] mod two_link;
+/// use twincal::robot::{Workspace, inverse_dynamics};
+///
+/// # let robot = two_link::arm(2.0)?;
+/// let (mut workspace, mut tau, rest) = (Workspace::new(&robot), [0.0; 2], [0.0; 2]);
+/// inverse_dynamics(&robot, &mut workspace, &[0.0, 0.0], &rest, &rest, &mut tau);
+/// let (shoulder, elbow) = (9.81 * (3.0 * 0.5 + 2.0 * 1.0), 9.81 * 2.0 * 0.5);
+/// assert!((tau[0] - shoulder).abs() < 1e-9 && (tau[1] - elbow).abs() < 1e-9);
+/// # Ok::<(), twincal::Error>(())
+/// ```
 pub fn inverse_dynamics(
     robot: &Robot,
     workspace: &mut Workspace,
@@ -62,6 +76,21 @@ pub fn inverse_dynamics(
 ///
 /// # Panics
 /// If `q` is shorter than dof or `mass` than dof².
+///
+/// # Example
+/// Two links l of 0.5 m with point masses of 3 kg and 2 kg at their ends, elbow at a right angle: M₁₁ = 3 l² + 2 (l² + l²), M₁₂ = M₂₂ = 2 l².
+/// ```
+/// # #[path = "../../examples/two_link.rs"] mod two_link;
+/// use twincal::robot::{Workspace, mass_matrix};
+///
+/// # let robot = two_link::arm(2.0)?;
+/// let (mut workspace, mut mass) = (Workspace::new(&robot), [0.0; 4]);
+/// mass_matrix(&robot, &mut workspace, &[0.3, std::f64::consts::FRAC_PI_2], &mut mass);
+/// for (found, expected) in mass.iter().zip([1.75, 0.5, 0.5, 0.5]) {
+///     assert!((found - expected).abs() < 1e-9);
+/// }
+/// # Ok::<(), twincal::Error>(())
+/// ```
 pub fn mass_matrix(robot: &Robot, workspace: &mut Workspace, q: &[f64], mass: &mut [f64]) {
     let n = robot.dof();
     let still = vec![0.0; n];
@@ -102,6 +131,23 @@ fn run_one(robot: &Robot, workspace: &mut Workspace, gravity: [f64; 3], [q, qd, 
 ///
 /// # Panics
 /// If a slice is shorter than dof × len.
+///
+/// # Example
+/// Two samples of an arm with 3 kg at its elbow and 2 kg at its tip: stretched out, and hanging down, where no torque is needed.
+/// ```
+/// # #[path = "../../examples/two_link.rs"] mod two_link;
+/// use twincal::robot::{Motion, nominal_torque};
+///
+/// # let robot = two_link::arm(2.0)?;
+/// let q = [0.0, -std::f64::consts::FRAC_PI_2, 0.0, 0.0]; // both samples of the shoulder, then of the elbow
+/// let motion = Motion { len: 2, q: &q, qd: &[0.0; 4], qdd: &[0.0; 4] };
+/// let mut tau = [0.0; 4];
+/// nominal_torque(&robot, motion, &mut tau);
+/// for (found, expected) in tau.iter().zip([9.81 * 3.5, 0.0, 9.81, 0.0]) {
+///     assert!((found - expected).abs() < 1e-9);
+/// }
+/// # Ok::<(), twincal::Error>(())
+/// ```
 pub fn nominal_torque(robot: &Robot, motion: Motion<'_>, tau: &mut [f64]) {
     nominal_torque_with(Instructions::Widest, robot, motion, tau);
 }

@@ -8,6 +8,18 @@ use super::{Placement, spatial};
 ///
 /// # Panics
 /// If a slice is shorter than dof.
+///
+/// # Example
+/// Two links of 0.5 m, stretched out, turn about the shoulder at 2 rad/s: ½ (3 · 0.5² + 2 · 1²) · 2² J.
+/// ```
+/// # #[path = "../../examples/two_link.rs"] mod two_link;
+/// use twincal::robot::kinetic_energy;
+///
+/// # let robot = two_link::arm(2.0)?;
+/// let energy = kinetic_energy(&robot, &[0.0, 0.0], &[2.0, 0.0]);
+/// assert!((energy - 5.5).abs() < 1e-9);
+/// # Ok::<(), twincal::Error>(())
+/// ```
 pub fn kinetic_energy(robot: &Robot, q: &[f64], qd: &[f64]) -> f64 {
     // Angular and linear velocity of each body's origin, in the body's frame.
     let mut velocities: Vec<(Vector, Vector)> = Vec::with_capacity(robot.bodies.len());
@@ -46,6 +58,18 @@ pub fn kinetic_energy(robot: &Robot, q: &[f64], qd: &[f64]) -> f64 {
 ///
 /// # Panics
 /// If `q` is shorter than dof.
+///
+/// # Example
+/// 3 kg at 0.5 m and 2 kg at 1 m above the base.
+/// ```
+/// # #[path = "../../examples/two_link.rs"] mod two_link;
+/// use twincal::robot::potential_energy;
+///
+/// # let robot = two_link::arm(2.0)?;
+/// let upright = potential_energy(&robot, &[std::f64::consts::FRAC_PI_2, 0.0]);
+/// assert!((upright - 9.81 * (3.0 * 0.5 + 2.0 * 1.0)).abs() < 1e-9);
+/// # Ok::<(), twincal::Error>(())
+/// ```
 pub fn potential_energy(robot: &Robot, q: &[f64]) -> f64 {
     let mut places: Vec<Placement> = Vec::with_capacity(robot.bodies.len());
     let mut energy = 0.0;

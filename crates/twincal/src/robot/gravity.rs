@@ -19,6 +19,21 @@ use std::ops::Range;
 /// # Source
 /// The gravity part of the recursive Newton–Euler equations on composite bodies (mass and first moment of everything
 /// that a joint carries): `τ = z · (mc × a)`, a = −gravity.
+///
+/// # Example
+/// Stretched along x, 3 kg at 0.5 m and 2 kg at 1 m: gravity along y acts on the shoulder with a lever of Σ m x = 3.5 kg·m, gravity along x with none.
+/// ```
+/// # #[path = "../../examples/two_link.rs"] mod two_link;
+/// use twincal::robot::{BlockWorkspace, Motion, STRIDE, gravity_regressor};
+///
+/// # let robot = two_link::arm(2.0)?;
+/// let motion = Motion { len: 1, q: &[0.0; 2], qd: &[0.0; 2], qdd: &[0.0; 2] };
+/// let mut out = vec![0.0; 2 * 3 * STRIDE];
+/// gravity_regressor(&robot, &mut BlockWorkspace::new(&robot), motion, 0..1, &mut out);
+/// let [x, y] = [out[0], out[STRIDE]]; // of the shoulder
+/// assert!(x.abs() < 1e-9 && (y + 3.5).abs() < 1e-9); // N·m per m/s²
+/// # Ok::<(), twincal::Error>(())
+/// ```
 pub fn gravity_regressor(
     robot: &Robot,
     workspace: &mut BlockWorkspace,

@@ -140,6 +140,26 @@ impl Robot {
     /// # Errors
     /// [`Error::Model`] for cycles, two roots, orphans, duplicate names, zero axes, impossible masses or inertias,
     /// locked or mimicked joints that do not exist, a robot without a moving joint.
+    ///
+    /// # Example
+    /// An arm with its elbow locked at a right angle is a robot of one joint: 3 kg at the elbow and 2 kg above it, both 0.5 m from the shoulder's axis.
+    /// ```
+    /// # #[path = "../../examples/two_link.rs"] mod two_link;
+    /// use std::collections::BTreeMap;
+    /// use twincal::robot::{Robot, Workspace, inverse_dynamics};
+    ///
+    /// # let description = two_link::arm(2.0)?.description().clone();
+    /// let locked = BTreeMap::from([("elbow".to_owned(), std::f64::consts::FRAC_PI_2)]);
+    /// let (robot, findings) = Robot::new(description, &locked)?;
+    /// for finding in &findings {
+    ///     println!("{}", finding.message);
+    /// }
+    /// assert_eq!(robot.joint_names(), ["shoulder"]);
+    /// let mut tau = [0.0];
+    /// inverse_dynamics(&robot, &mut Workspace::new(&robot), &[0.0], &[0.0], &[0.0], &mut tau);
+    /// assert!((tau[0] - 9.81 * (3.0 + 2.0) * 0.5).abs() < 1e-9);
+    /// # Ok::<(), twincal::Error>(())
+    /// ```
     pub fn new(
         description: RobotDescription,
         locked: &BTreeMap<String, f64>,

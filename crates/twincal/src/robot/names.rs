@@ -4,6 +4,14 @@ use crate::words::{listed, quoted, shortened};
 
 /// Up to three candidates nearest to `name` by edit distance (insert, delete, replace, swap neighbours; letter case is
 /// free; at most a third of the letters), nearest first, ties in the given order; none when nothing is near.
+///
+/// # Example
+/// ```
+/// use twincal::robot::nearest_names;
+///
+/// assert_eq!(nearest_names("elbw", ["shoulder", "elbow", "wrist"]), ["elbow"]);
+/// assert!(nearest_names("gripper", ["shoulder", "elbow"]).is_empty());
+/// ```
 pub fn nearest_names<'a>(
     name: &str,
     candidates: impl IntoIterator<Item = &'a str>,

@@ -30,6 +30,17 @@ pub(super) const ENTRIES: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1),
 ///
 /// # Source
 /// Parallel axes (Steiner), as in [`Inertia`]'s documentation.
+///
+/// # Example
+/// 2 kg at 0.5 m along x: the first moment is m c, the moments about y and z grow by m c² (Steiner).
+/// ```
+/// use twincal::robot::{Inertia, Placement, body_parameters, inertia_of};
+///
+/// let link = Inertia { mass: 2.0, com: [0.5, 0.0, 0.0], tensor: [[0.25, 0.0, 0.0], [0.0, 0.5, 0.0], [0.0, 0.0, 0.5]] };
+/// let parameters = body_parameters(&link, &Placement::IDENTITY);
+/// assert_eq!(parameters, [2.0, 1.0, 0.0, 0.0, 0.25, 0.0, 0.0, 1.0, 0.0, 1.0]);
+/// assert_eq!(inertia_of(&parameters), Some(link));
+/// ```
 pub fn body_parameters(inertia: &Inertia, placement: &Placement) -> [f64; 10] {
     flatten(&Moments::placed(inertia, placement))
 }

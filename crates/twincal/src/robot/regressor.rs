@@ -31,6 +31,28 @@ pub struct Pair {
 }
 
 /// The joint-torque regressor of one robot, see the [module](self).
+///
+/// # Example
+/// Rigid-body torque is linear in the inertial parameters: columns times parameters are the nominal torque.
+/// ```
+/// # #[path = "../../examples/two_link.rs"] mod two_link;
+/// use twincal::robot::{Motion, Regressor, nominal_torque};
+///
+/// # let robot = two_link::arm(2.0)?;
+/// let motion = Motion { len: 1, q: &[0.3, -0.8], qd: &[0.5, 0.2], qdd: &[1.0, -2.0] };
+/// let regressor = Regressor::new(&robot);
+/// let mut block = regressor.block(&robot);
+/// regressor.evaluate(&robot, motion, 0..1, &mut block);
+/// let (mut torque, mut nominal) = ([0.0; 2], [0.0; 2]);
+/// for (number, pair) in regressor.pairs().iter().enumerate() {
+///     for (k, parameter) in robot.parameters_of_body(pair.body).iter().enumerate() {
+///         torque[pair.coordinate] += block.column(number, k)[0] * parameter;
+///     }
+/// }
+/// nominal_torque(&robot, motion, &mut nominal);
+/// assert!((0..2).all(|joint| (torque[joint] - nominal[joint]).abs() < 1e-9));
+/// # Ok::<(), twincal::Error>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Regressor {
     pairs: Vec<Pair>,

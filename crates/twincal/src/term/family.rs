@@ -3,6 +3,16 @@
 use serde::{Deserialize, Serialize};
 
 /// Which family a component belongs to; each family has its own Beta–Binomial inclusion prior and slab scale.
+///
+/// # Example
+/// ```
+/// use twincal::term::Family;
+///
+/// assert_eq!(Family::MotorInertia.word(), "motor_inertia"); // as in `elbow.motor_inertia` and `[library] families`
+/// assert!(Family::DEFAULT.contains(&Family::Payload) && !Family::DEFAULT.contains(&Family::Ripple));
+/// let friction = Family::JOINT.into_iter().filter(|family| family.is_friction());
+/// assert!(friction.eq([Family::Viscous, Family::Coulomb]));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Family {

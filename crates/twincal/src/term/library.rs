@@ -73,6 +73,26 @@ impl Library {
     ///
     /// # Source
     /// Paper eq. (2)–(4), method sections 2 and 3.
+    ///
+    /// # Example
+    /// ```
+    /// # #[path = "../../examples/two_link.rs"] mod two_link;
+    /// use twincal::term::{Family, Library, LibrarySettings, Status};
+    ///
+    /// # let robot = two_link::arm(2.0)?;
+    /// let settings = LibrarySettings {
+    ///     terms: vec!["sin(q1 - q2)".into(), "qd1".into()], // in ΔL
+    ///     generic: Some(false),
+    ///     families: vec![Family::Viscous],
+    ///     ..LibrarySettings::default()
+    /// };
+    /// let (library, findings) = Library::propose(&robot, &settings)?;
+    /// let names = library.columns().iter().map(|&term| &library.terms()[term].name);
+    /// assert!(names.eq(["sin(q1 - q2)", "shoulder.viscous", "elbow.viscous"]));
+    /// assert_eq!(library.terms()[1].status, Status::NullLagrangian); // its torque is 0 for every motion
+    /// assert!(findings.iter().any(|finding| finding.subject == "qd1"));
+    /// # Ok::<(), twincal::Error>(())
+    /// ```
     pub fn propose(robot: &Robot, settings: &LibrarySettings) -> Result<(Self, Vec<Finding>)> {
         Self::build(&About::robot(robot, &joints(robot)), settings, None)
     }

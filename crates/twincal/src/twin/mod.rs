@@ -22,6 +22,20 @@ use crate::term::{Family, Library, LibrarySettings};
 use serde::{Deserialize, Serialize};
 
 /// Robot + terms + posterior. Everything a prediction needs, nothing else; this is what `twin.json` holds.
+///
+/// # Example
+/// A twin is the same after it was written and read, to the last bit.
+/// ```
+/// # #[path = "../../examples/two_link.rs"] mod two_link;
+/// use twincal::prelude::*;
+///
+/// # let fit = two_link::study()?;
+/// let text = serde_json::to_string(fit.twin())?;
+/// let again: Twin = serde_json::from_str(&text)?;
+/// assert_eq!(&again, fit.twin());
+/// assert_eq!(again.robot.joint_names(), ["shoulder", "elbow"]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Twin {
     /// The nominal robot.
@@ -147,6 +161,16 @@ impl Twin {
     ///
     /// # Panics
     /// If there is no such joint.
+    ///
+    /// # Example
+    /// The shoulder was between −1 and 1 rad in the logs; within 5 % of this range beyond its ends a prediction is no extrapolation.
+    /// ```
+    /// # #[path = "../../examples/two_link.rs"] mod two_link;
+    /// # let fit = two_link::study()?;
+    /// let [low, high, ..] = fit.twin().limits(0);
+    /// assert!((low + 1.1).abs() < 0.01 && (high - 1.1).abs() < 0.01);
+    /// # Ok::<(), twincal::Error>(())
+    /// ```
     #[must_use]
     pub fn limits(&self, joint: usize) -> [f64; 6] {
         let hull = reachable(self.hull[joint], self.robot.joint_kind(joint));

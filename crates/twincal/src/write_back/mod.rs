@@ -114,6 +114,24 @@ pub struct WriteBack {
 }
 
 /// Everything that a write-back needs of a calibration, worked out once for mean and draws.
+///
+/// # Example
+/// 2 kg at the tip in the model, 2.6 kg in truth: the new inertia is the link's, the hidden torque has no place in a model file.
+/// ```
+/// # #[path = "../../examples/two_link.rs"] mod two_link;
+/// use twincal::robot::potential_energy;
+/// use twincal::write_back::{Holds, Writer};
+///
+/// # let fit = two_link::study()?;
+/// let change = Writer::new(&fit, Holds::URDF)?.mean()?;
+/// assert_eq!(change.links[0].link, "fore");
+/// assert!((change.links[0].after.mass - 2.6).abs() < 0.02);
+/// assert_eq!(change.residual[0].component, "sin(q1 - q2)");
+/// let calibrated = change.robot(&fit.twin().robot)?; // the robot that the file describes
+/// let upright = potential_energy(&calibrated, &[std::f64::consts::FRAC_PI_2, 0.0]);
+/// assert!((upright - 9.81 * (3.0 * 0.5 + 2.6 * 1.0)).abs() < 0.1); // J
+/// # Ok::<(), twincal::Error>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Writer<'a> {
     calibration: &'a Calibration,

@@ -28,6 +28,23 @@ pub enum Language {
 ///
 /// # Errors
 /// [`crate::Error::Content`] for a function that the language has not.
+///
+/// # Example
+/// The same program as C, and as steps for another language.
+/// ```
+/// # #[path = "../../../../twincal/examples/two_link.rs"] mod two_link;
+/// use twincal::evaluator::Evaluator;
+/// use twincal_io::export::code::{Language, source};
+///
+/// # let fit = two_link::study()?;
+/// let program = Evaluator::new(fit.twin(), None)?;
+/// let c = source(&program, Language::C, &["Arm of two links.".into()])?;
+/// assert!(c.starts_with("/* Arm of two links.") && c.contains("int twincal_evaluate(const double q[2]"));
+/// let steps: serde_json::Value = serde_json::from_str(&source(&program, Language::Json, &[])?)?;
+/// assert_eq!(steps["joints"][1]["name"], "elbow");
+/// assert_eq!(steps["steps"].as_array().map(Vec::len), Some(program.steps.len()));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn source(evaluator: &Evaluator, language: Language, about: &[String]) -> Result<String> {
     match language {
         Language::C => Ok(c::source(evaluator, about)),

@@ -35,6 +35,27 @@ pub struct Generated {
 /// # Errors
 /// [`crate::Error::Content`] where the format has no words for the robot: a link called `world` beside the base, more nested bodies than
 /// readers take, a moving inertia that MuJoCo refuses. [`crate::Error::Internal`] if the file does not read back as what was meant.
+///
+/// # Example
+/// A URDF as an MJCF: the pendulum of both has the same energy.
+/// ```
+/// use twincal::robot::potential_energy;
+/// use twincal::write_back::WriteBack;
+/// use twincal_io::export::generate::generate_model;
+/// use twincal_io::model::{ModelFormat, parse_model};
+///
+/// # let text = r#"<robot name="pendulum"><link name="base"/><link name="rod"><inertial><origin xyz="0 0 -0.5"/><mass value="1"/>
+/// # <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+/// # <joint name="pivot" type="continuous"><parent link="base"/><child link="rod"/><axis xyz="0 1 0"/></joint></robot>"#;
+/// # let (robot, _) = parse_model("pendulum.urdf", text.as_bytes(), &Default::default())?.robot(&Default::default())?;
+/// let generated = generate_model(ModelFormat::Mjcf, &robot, &WriteBack::default(), "pendulum.urdf")?;
+/// let model = parse_model("pendulum.xml", &generated.bytes, &Default::default())?;
+/// assert_eq!(model.format(), ModelFormat::Mjcf);
+/// let (again, _) = model.robot(&Default::default())?;
+/// assert!((potential_energy(&again, &[0.0]) + 9.81 * 1.0 * 0.5).abs() < 1e-9); // 1 kg hangs 0.5 m below the pivot
+/// assert!((potential_energy(&again, &[1.0]) - potential_energy(&robot, &[1.0])).abs() < 1e-9);
+/// # Ok::<(), twincal_io::Error>(())
+/// ```
 pub fn generate_model(
     format: ModelFormat,
     robot: &Robot,

@@ -90,6 +90,26 @@ pub struct ComponentSummary {
 }
 
 /// A physical parameter with its uncertainty, given that its component is in.
+///
+/// # Example
+/// Reports print value ± spread, or both ends of the 95 % interval where ± does not describe the parameter.
+/// ```
+/// use twincal::prelude::*;
+///
+/// let mut stiffness = ParameterSummary {
+///     name: "stiffness".into(),
+///     unit: "N·m/rad".into(),
+///     mean: 1.75,
+///     sd: 0.25,
+///     interval95: [1.25, 2.25],
+///     median: 1.75,
+///     interval68: [1.5, 2.0],
+///     seen: true,
+/// };
+/// assert_eq!((stiffness.told(), stiffness.ends()), ((1.75, 0.25), None));
+/// stiffness.interval95 = [1.25, 4.0]; // a tail on one side
+/// assert_eq!(stiffness.ends(), Some([1.25, 4.0]));
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ParameterSummary {
     /// `mass`, `com_x`, `stiffness`, …
@@ -311,6 +331,25 @@ pub struct Curve {
 }
 
 /// The result of a calibration; `twincal-io` writes it as files.
+///
+/// # Example
+/// An arm with 0.6 kg more at its tip than its model says, a hidden torque, and noise of 0.1 N·m.
+/// ```
+/// # #[path = "../../../examples/two_link.rs"] mod two_link;
+/// use twincal::prelude::*;
+///
+/// # let fit = two_link::study()?;
+/// let scores = &fit.validation.filtered; // torque of the held-out log
+/// assert!(scores.rmse_nominal > 3.0 && scores.rmse_calibrated < 0.105);
+/// let established = fit.effects().filter(|effect| effect.status() == Status::Established);
+/// let mut names: Vec<&str> = established.map(|effect| effect.name()).collect();
+/// names.sort_unstable();
+/// assert_eq!(names, ["payload", "sin(q1 - q2)"]);
+/// for finding in &fit.findings {
+///     println!("{}", finding.message);
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Calibration {
     /// The calibrated twin.

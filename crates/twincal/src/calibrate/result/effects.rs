@@ -9,6 +9,18 @@ use std::fmt;
 /// One effect that the data speak for: established, tentative, or one of a set that they cannot tell apart.
 ///
 /// It prints as one line: status, probability, and what it is with its numbers.
+///
+/// # Example
+/// The tip of the arm carries 0.6 kg more than its model says.
+/// ```
+/// # #[path = "../../../examples/two_link.rs"] mod two_link;
+/// # let fit = two_link::study()?;
+/// let payload = fit.effects().find(|effect| effect.name() == "payload").ok_or("none")?;
+/// let mass = payload.parameter("mass").ok_or("none")?;
+/// assert!((mass.mean - 0.6).abs() < 0.01 && payload.pip() > 0.99);
+/// assert!(payload.to_string().starts_with("established   PIP"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Effect<'a> {
     component: &'a ComponentSummary,

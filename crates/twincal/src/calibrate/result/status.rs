@@ -8,6 +8,18 @@ const ABSENT: f64 = 0.2;
 /// Probability from which an effect is in the median-probability model.
 pub(in crate::calibrate) const MEDIAN: f64 = 0.5;
 /// What the data say of an effect.
+///
+/// # Example
+/// ```
+/// # #[path = "../../../examples/two_link.rs"] mod two_link;
+/// use twincal::prelude::*;
+///
+/// # let fit = two_link::study()?;
+/// let count = |status| fit.components.iter().filter(|own| own.status == status).count();
+/// assert_eq!(count(Status::Established), 2); // the load at the tip and the hidden term
+/// println!("{} {}", count(Status::Absent), Status::Absent.word());
+/// # Ok::<(), twincal::Error>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Status {

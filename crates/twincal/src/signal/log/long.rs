@@ -130,6 +130,18 @@ impl LongLog {
 }
 
 /// A log as a calibration takes it.
+///
+/// # Example
+/// ```
+/// use twincal::prelude::*;
+///
+/// let recording = Recording::new("run1", [0.0, 0.1, 0.2]).joint([0.1; 3], [4.0; 3])?;
+/// let mut log = Log::from(&recording); // lent: the numbers are not copied
+/// assert_eq!((log.name(), log.samples()), ("run1", 3));
+/// assert_eq!(log.rename("monday"), "run1");
+/// assert_eq!(log.name(), "monday");
+/// # Ok::<(), twincal::Error>(())
+/// ```
 #[derive(Debug, Clone)]
 pub enum Log<'a> {
     /// In memory.

@@ -130,6 +130,16 @@ impl Recording {
     }
 
     /// What the robot carried.
+    ///
+    /// # Example
+    /// ```
+    /// use twincal::prelude::*;
+    ///
+    /// let log = Recording::new("with a gripper", [0.0, 0.01, 0.02]).joint([0.1; 3], [4.0; 3])?;
+    /// let log = log.carrying(Payload::Known { mass: 0.9, com: [0.0, 0.0, 0.06] }); // kg, m in the payload frame
+    /// assert!(matches!(log.payload, Payload::Known { mass, .. } if mass == 0.9));
+    /// # Ok::<(), twincal::Error>(())
+    /// ```
     #[must_use]
     pub fn carrying(mut self, payload: Payload) -> Self {
         self.payload = payload;
