@@ -34,8 +34,9 @@ mod rest;
 mod scores;
 mod shape;
 
+pub use crate::error::Evidence;
 pub use answer::{Answer, decision_table};
-pub use claim::{Claim, Evidence, Role, Subject};
+pub use claim::{Claim, Role, Subject};
 pub use decide::decide;
 pub use next::{Request, RequestCode, open_effects};
 pub use rest::{AtRest, Pauses, all_at_rest, at_rest, few_pauses, standstill};
