@@ -3,8 +3,7 @@
 use super::RobotDescription;
 use super::bodies::Body;
 use super::spatial::dot;
-use crate::error::Code;
-use crate::error::{Finding, Severity};
+use crate::error::{Code, Finding, Severity};
 use crate::words::significant;
 use std::f64::consts::PI;
 
@@ -30,7 +29,8 @@ pub(super) fn report(
         let (mass, link) = (body.moments.mass, &description.links[body.link].name);
         // An impossible tensor has no radius.
         let told = |finding: &Finding| {
-            [CODE, Code::UnphysicalInertia].contains(&finding.code) && finding.subject == *link
+            [Code::PointMass, Code::UnphysicalInertia].contains(&finding.code)
+                && finding.subject == *link
         };
         if mass <= WORTH_TELLING * all || findings.iter().any(told) {
             continue;
@@ -60,15 +60,19 @@ pub(super) fn report(
             significant(1e3 * radius, 2),
             significant(1e3 * (0.4_f64).sqrt() * ball, 2)
         );
-        findings.push(Finding::new(Severity::Note, CODE, link, message, 1));
+        let numbers = [
+            ("mass", mass),
+            ("radius_of_gyration", radius),
+            ("radius_of_tungsten", 0.4_f64.sqrt() * ball),
+        ];
+        findings
+            .push(Finding::new(Severity::Note, Code::PointMass, link, message, 1).with(numbers));
     }
 }
 
-/// The same of links without any tensor.
-pub(super) const CODE: Code = Code::PointMass;
-
 #[cfg(test)]
 mod tests {
+    use crate::error::Code;
     use crate::robot::{
         Inertia, JointDescription, JointKind, LinkDescription, Robot, RobotDescription,
     };
@@ -105,7 +109,7 @@ mod tests {
             ],
         };
         let (_, findings) = Robot::new(description, &BTreeMap::new()).unwrap();
-        let points = findings.iter().filter(|f| f.code == super::CODE);
+        let points = findings.iter().filter(|f| f.code == Code::PointMass);
         points.map(|finding| finding.message.clone()).collect()
     }
 

@@ -151,14 +151,15 @@ pub(crate) fn check(
     if zero_tensor {
         return Ok(Some(Finding::new(
             Severity::Note,
-            super::dense::CODE,
+            Code::PointMass,
             link,
             format!(
                 "link `{link}`: {mass} kg with inertia tensor 0: taken as a point mass. What its real tensor adds will be reported as motor inertia \
                  of its joint or as the tensor of another link; give the link its own in the model where you know it"
             ),
             1,
-        )));
+        )
+        .with([("mass", *mass)])));
     }
     let ([i1, i2, i3], _) = principal_axes(tensor);
     let problem = if hollow {
@@ -183,13 +184,13 @@ pub(crate) fn check(
     }
     let message =
         format!("link `{link}`: {problem}; used as it is because unphysical inertias are allowed");
-    Ok(Some(Finding::new(
-        Severity::Warning,
-        Code::UnphysicalInertia,
-        link,
-        message,
-        1,
-    )))
+    Ok(Some(
+        Finding::new(Severity::Warning, Code::UnphysicalInertia, link, message, 1).with([
+            ("principal_moment_1", i1),
+            ("principal_moment_2", i2),
+            ("principal_moment_3", i3),
+        ]),
+    ))
 }
 
 #[cfg(test)]

@@ -149,7 +149,11 @@ impl LongLog {
                     chapter + 1
                 ),
                 rows,
-            ));
+            )
+            .with([
+                ("chapters_left_out", count as f64), ("chapters", chapters as f64),
+                ("first_chapter", (chapter + 1) as f64),
+            ]));
         }
         Ok(())
     }
@@ -169,6 +173,10 @@ impl LongLog {
             ),
             samples as u64,
         )
+        .with([
+            ("chapters", self.chapters() as f64),
+            ("samples_at_most", self.samples.iter().max().copied().unwrap_or(0) as f64),
+        ])
     }
 }
 
@@ -373,11 +381,17 @@ pub(crate) fn told_once(said: Vec<(usize, Finding)>, chapters: usize) -> Vec<Fin
                 1 => "; one more is alike".to_owned(),
                 others => format!("; {others} more are alike"),
             };
-            Some(Finding {
+            let numbers = [
+                ("chapter", (chapter + 1) as f64),
+                ("chapters", chapters as f64),
+                ("chapters_alike", others as f64),
+            ];
+            let told = Finding {
                 message: format!("{} ({place}{more})", worst.message),
                 count,
                 ..worst
-            })
+            };
+            Some(told.with(numbers))
         })
         .collect()
 }
