@@ -2,7 +2,9 @@
 
 mod code;
 mod evidence;
+mod examples;
 mod mistake;
+mod table;
 
 pub use code::Code;
 pub use evidence::Evidence;
@@ -143,7 +145,7 @@ impl Finding {
         }
     }
 
-    /// With these numbers of its message, in SI units and radians, shares 0 … 1.
+    /// With these numbers of its message, in SI units and radians, shares 0 … 1. [`Code::evidence`] lists the names of each code.
     ///
     /// # Example
     /// ```
