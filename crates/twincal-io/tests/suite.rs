@@ -2,6 +2,7 @@
 
 mod common;
 
+mod codes_page;
 mod export_evaluator;
 mod log_arrow;
 mod log_bags;

@@ -1,9 +1,13 @@
 //! What can go wrong (`Error`: cannot go on) and what must be said (`Finding`: go on, but say so).
 
 mod code;
+mod evidence;
+mod examples;
 mod mistake;
+mod table;
 
 pub use code::Code;
+pub use evidence::Evidence;
 pub use mistake::Mistake;
 
 use serde::{Deserialize, Serialize};
@@ -216,6 +220,9 @@ pub struct Finding {
     pub message: String,
     /// How many samples, rows or elements it concerns; 0 when it does not count anything.
     pub count: u64,
+    /// The numbers of the message by name, in SI units and radians, shares 0 … 1; docs/codes.md has the names of every code.
+    #[serde(default, skip_serializing_if = "Evidence::is_empty")]
+    pub evidence: Evidence,
 }
 
 impl Finding {
@@ -234,7 +241,23 @@ impl Finding {
             joint: None,
             message: message.into(),
             count,
+            evidence: Evidence::default(),
         }
+    }
+
+    /// With these numbers of its message, in SI units and radians, shares 0 … 1. [`Code::evidence`] lists the names of each code.
+    ///
+    /// # Example
+    /// ```
+    /// use twincal::{Code, Finding, Severity};
+    ///
+    /// let finding = Finding::new(Severity::Note, Code::RateCapped, "", "rows are kept at 50 Hz", 0);
+    /// assert_eq!(finding.with([("rate", 50.0)]).evidence.get("rate"), Some(50.0));
+    /// ```
+    #[must_use]
+    pub fn with(mut self, numbers: impl IntoIterator<Item = (&'static str, f64)>) -> Self {
+        self.evidence.extend(numbers);
+        self
     }
 
     /// The same about one joint of the log that is its subject.

@@ -216,6 +216,27 @@ fn gates_decide_before_what_new_logs_are_said_to_be() {
     assert_eq!(of(short, &[]), (Answer::NotYet, Code::TooShortToCheck));
 }
 
+#[test]
+fn a_claim_has_the_numbers_of_its_finding() {
+    let found = Finding::new(Severity::Warning, Code::EncoderStuck, "elbow", "", 3)
+        .with([("from", 12.3), ("to", 12.4)])
+        .with(Some(("moved", 0.04)));
+    let json = serde_json::to_string(&found).unwrap();
+    assert_eq!(serde_json::from_str::<Finding>(&json).unwrap(), found);
+    let own = of_gates(Vec::new(), &[found], (&twin(), &[]));
+    let numbers: Vec<(&str, f64)> = own.claims[0].evidence.iter().collect();
+    let wanted = [
+        ("count", 3.0),
+        ("from", 12.3),
+        ("moved", 0.04),
+        ("to", 12.4),
+    ];
+    assert_eq!(numbers, wanted);
+    let bare = Finding::new(Severity::Note, Code::Forced, "", "", 0);
+    let json = serde_json::to_string(&bare).unwrap();
+    assert!(!json.contains("evidence"), "{json}");
+}
+
 /// Samples of the held-out log are 10 ms apart: what stands beside a row is the sample of that time.
 #[test]
 fn traces_have_the_torque_as_it_was_logged() {

@@ -8,6 +8,7 @@ mod two_link;
 mod changes;
 mod claims;
 mod codes_page;
+mod finding_sources;
 mod compare;
 mod drift;
 mod fleet;

@@ -139,13 +139,20 @@ impl<'a> AsFitted<'a> {
                 significant(ratio / factor.abs(), 2),
                 key(joint)
             );
-            doubts.push(Finding::new(
-                Severity::Warning,
-                Code::FactorInDoubt,
-                joint,
-                message,
-                log.samples(),
-            ));
+            doubts.push(
+                Finding::new(
+                    Severity::Warning,
+                    Code::FactorInDoubt,
+                    joint,
+                    message,
+                    log.samples(),
+                )
+                .with([
+                    ("factor", factor),
+                    ("range", range),
+                    ("range_in_fit", fitted),
+                ]),
+            );
         }
         Ok(doubts)
     }

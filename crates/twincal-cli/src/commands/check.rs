@@ -75,7 +75,9 @@ pub(super) fn run(flags: &Check, terminal: &mut Terminal) -> Outcome<u8> {
     drop(progress);
     require_strict(settings.log.strict, &found)?;
     let known = known_logs(&logs.files, &stored);
-    let fitted = known.iter().filter(|finding| finding.code == FITTED);
+    let fitted = known
+        .iter()
+        .filter(|finding| finding.code == Code::LogWasFitted);
     let fitted = fitted.count() == logs.files.len();
     let own = Own::of(&stored, gates, fitted);
     let mut gates = judge(&validation, &own);
@@ -212,9 +214,6 @@ fn too_short(validation: &Validation, twin: &Twin) -> String {
     )
 }
 
-/// Code of logs that the twin was fitted to.
-const FITTED: Code = Code::LogWasFitted;
-
 /// What a log was in the fit of a twin, by its checksum; `None` for one that was not there.
 pub(super) fn role_in_fit<'a>(file: &FileHash, stored: &'a StoredTwin) -> Option<&'a str> {
     let mut known = stored.context.files.iter();
@@ -233,7 +232,7 @@ fn known_logs(files: &[FileHash], stored: &StoredTwin) -> Vec<Finding> {
                 "one that the twin was judged by when it was fitted: it repeats those scores",
             ),
             _ => (
-                FITTED,
+                Code::LogWasFitted,
                 "one that the twin was fitted to: no independent check",
             ),
         };

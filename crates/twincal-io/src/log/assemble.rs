@@ -208,13 +208,16 @@ impl Make {
             }
             if self.selection.time.is_some() {
                 let message = format!("time stamps were replaced by row / {rate} Hz as told");
-                findings.push(Finding::new(
-                    Severity::Note,
-                    Code::TimeReplaced,
-                    name,
-                    message,
-                    self.rows as u64,
-                ));
+                findings.push(
+                    Finding::new(
+                        Severity::Note,
+                        Code::TimeReplaced,
+                        name,
+                        message,
+                        self.rows as u64,
+                    )
+                    .with([("rate", rate)]),
+                );
             }
             return Ok(rows.map(|row| row as f64 / rate).collect());
         }
@@ -225,13 +228,10 @@ impl Make {
                 "time counts from the stamp {} s, the first of the log",
                 stamps::digits(origin)
             );
-            findings.push(Finding::new(
-                Severity::Note,
-                Code::TimeOrigin,
-                name,
-                message,
-                0,
-            ));
+            findings.push(
+                Finding::new(Severity::Note, Code::TimeOrigin, name, message, 0)
+                    .with([("origin", origin as f64 / 1e9)]),
+            );
         }
         if let Some(unit) = options.columns.time_unit.filter(|unit| unit.ticks() != 1.0) {
             time.iter_mut().for_each(|time| *time /= unit.ticks());
@@ -239,13 +239,10 @@ impl Make {
                 "time stamps were taken as {} as [columns] time_unit says",
                 unit.word()
             );
-            findings.push(Finding::new(
-                Severity::Note,
-                Code::TimeUnit,
-                name,
-                message,
-                0,
-            ));
+            findings.push(
+                Finding::new(Severity::Note, Code::TimeUnit, name, message, 0)
+                    .with([("ticks_per_second", unit.ticks())]),
+            );
         } else if let Some(preset) = options.preset.filter(|p| wants_ticks(*p, options)) {
             time.iter_mut().for_each(|time| *time /= preset.ticks());
             let message = format!(
@@ -253,13 +250,10 @@ impl Make {
                 preset.ticks(),
                 preset.name()
             );
-            findings.push(Finding::new(
-                Severity::Note,
-                Code::TimeUnit,
-                name,
-                message,
-                0,
-            ));
+            findings.push(
+                Finding::new(Severity::Note, Code::TimeUnit, name, message, 0)
+                    .with([("ticks_per_second", preset.ticks())]),
+            );
         }
         Ok(time)
     }
@@ -279,6 +273,7 @@ fn dropped(name: &str, rows: usize, cells: &mut Cells) -> Finding {
         100.0 * share
     );
     Finding::new(severity, Code::UnreadableRows, name, message, cells.dropped)
+        .with([("share", share)])
 }
 
 /// Whether a preset's own clock counts: not where the config states the unit.

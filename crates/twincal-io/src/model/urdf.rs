@@ -211,13 +211,10 @@ fn joint(
             let message = format!(
                 "joint `{name}`: <dynamics> states damping {damping} and friction {friction}: {used}"
             );
-            findings.push(Finding::new(
-                Severity::Note,
-                Code::UrdfDynamics,
-                &name,
-                message,
-                1,
-            ));
+            findings.push(
+                Finding::new(Severity::Note, Code::UrdfDynamics, &name, message, 1)
+                    .with([("damping", damping), ("friction", friction)]),
+            );
         }
     }
     Ok(joint)
@@ -255,13 +252,10 @@ fn take_frames(
         let name = &link.name;
         let message =
             format!("link `{name}`: mass 0 and no moving joint of its own, taken as a frame{rest}");
-        findings.push(Finding::new(
-            severity,
-            Code::MasslessFrame,
-            name,
-            message,
-            1,
-        ));
+        findings.push(
+            Finding::new(severity, Code::MasslessFrame, name, message, 1)
+                .with((largest > 0.0).then_some(("largest_moment", largest))),
+        );
         link.inertia = None;
     }
 }

@@ -2,9 +2,8 @@
 
 use super::answer::Answer;
 use crate::calibrate::Calibration;
-use crate::error::{Code, Finding, Severity};
+use crate::error::{Code, Evidence, Finding, Severity};
 use serde::Serialize;
-use std::collections::BTreeMap;
 
 /// A claim: what is said of whom, by which numbers.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -92,29 +91,6 @@ impl Subject {
     }
 }
 
-/// Numbers behind a claim by name, in SI units; shares are 0 … 1. A number that does not exist is NaN, in JSON `null`.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
-pub struct Evidence(BTreeMap<&'static str, f64>);
-
-impl Evidence {
-    /// Of these numbers.
-    #[must_use]
-    pub fn of<const N: usize>(numbers: [(&'static str, f64); N]) -> Self {
-        Self(BTreeMap::from(numbers))
-    }
-
-    /// The number of this name.
-    #[must_use]
-    pub fn get(&self, name: &str) -> Option<f64> {
-        self.0.get(name).copied()
-    }
-
-    /// All numbers, by name.
-    pub fn iter(&self) -> impl Iterator<Item = (&'static str, f64)> {
-        self.0.iter().map(|(name, number)| (*name, *number))
-    }
-}
-
 impl Claim {
     /// A number of its evidence; NaN where it has none of this name.
     #[must_use]
@@ -130,7 +106,7 @@ impl Claim {
 
     /// With these numbers too.
     pub(super) fn with(mut self, numbers: impl IntoIterator<Item = (&'static str, f64)>) -> Self {
-        self.evidence.0.extend(numbers);
+        self.evidence.extend(numbers);
         self
     }
 
@@ -186,7 +162,7 @@ impl Claim {
         Self::found(finding, Subject::of(&finding.subject, calibration))
     }
 
-    /// What was found, and of whom.
+    /// What was found, and of whom, by its numbers and its count.
     pub(super) fn found(finding: &Finding, subject: Subject) -> Self {
         let role = match (finding.mistake(), finding.severity) {
             (Some(_), _) => Role::ForbidsYes,
@@ -194,12 +170,14 @@ impl Claim {
             (None, Severity::Warning | Severity::Degraded) => Role::Limits,
         };
         let count = (finding.count > 0).then_some(("count", finding.count as f64));
+        let mut evidence = finding.evidence.clone();
+        evidence.extend(count);
         Self {
             code: finding.code,
             role,
             severity: finding.severity,
             subject,
-            evidence: Evidence(count.into_iter().collect()),
+            evidence,
         }
     }
 }

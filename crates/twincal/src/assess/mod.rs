@@ -35,8 +35,9 @@ mod rest;
 mod scores;
 mod shape;
 
+pub use crate::error::Evidence;
 pub use answer::{Answer, decision_table};
-pub use claim::{Claim, Evidence, Role, Subject};
+pub use claim::{Claim, Role, Subject};
 pub use decide::decide;
 pub use explanation::{Explanation, TensorElement, explanations};
 pub use next::{Request, RequestCode, open_effects};

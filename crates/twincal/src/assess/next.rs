@@ -2,10 +2,11 @@
 
 use super::answer::Answer;
 use super::beyond;
-use super::claim::{Claim, Evidence, Role, Subject};
+use super::claim::{Claim, Role, Subject};
 use super::rest::hardly_at_rest;
 use super::scores::{FEW, independent_rows};
 use crate::calibrate::{Alike, Calibration};
+use crate::error::Evidence;
 use crate::error::{Code, Finding};
 use crate::posterior::OPEN;
 use crate::validate::Split;

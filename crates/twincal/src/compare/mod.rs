@@ -262,13 +262,16 @@ pub fn hindrances(before: &Twin, after: &Twin) -> Result<Vec<Finding>> {
         "friction reverses within {old} rad/s (m/s) before and {new} after: its numbers differ for that alone; fit both with \
          [library] coulomb_velocity = {old}"
     );
-    Ok(vec![Finding::new(
-        Severity::Warning,
-        Code::CoulombVelocityDiffers,
-        "",
-        message,
-        0,
-    )])
+    Ok(vec![
+        Finding::new(
+            Severity::Warning,
+            Code::CoulombVelocityDiffers,
+            "",
+            message,
+            0,
+        )
+        .with([("velocity_before", old), ("velocity_after", new)]),
+    ])
 }
 
 /// Whether a twin is likely to hold friction that turns round.

@@ -230,7 +230,11 @@ fn finding([first, second]: [&Log<'_>; 2], found: &Match) -> Result<Finding> {
             significant(seconds, 3),
         ),
         rows as u64,
-    ))
+    )
+    .with([
+        ("seconds", seconds), ("correlation", correlation), ("correlation_sd", chance),
+        ("first_row", here as f64), ("first_row_of_original", there as f64),
+    ]))
 }
 
 #[cfg(test)]

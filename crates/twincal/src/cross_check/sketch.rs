@@ -151,7 +151,7 @@ pub fn sketched_copies(logs: &[(&str, &Sketch)]) -> Vec<Finding> {
             "log `{log}` is a copy of `{other}` or of a part of it: {percent} % of the patterns in its torque noise are in both (independent recordings \
              have hardly any); nothing is tested by a copy: give another recording instead of it"
         );
-        Finding::new(Severity::Degraded, Code::CopiedLog, log, message, 0)
+        Finding::new(Severity::Degraded, Code::CopiedLog, log, message, 0).with([("share", share)])
     };
     of.into_iter().map(finding).collect()
 }

@@ -71,7 +71,8 @@ fn finding(log: &str, joint: &str, held: &[Held]) -> Option<Finding> {
             significant(longest.lost.abs(), 3)
         ),
         held.len() as u64,
-    ))
+    )
+    .with([("from", from), ("to", to), ("moved", longest.lost.abs())]))
 }
 
 /// Of one joint of a recording.

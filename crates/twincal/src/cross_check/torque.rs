@@ -334,6 +334,7 @@ impl Names<'_> {
             ),
             0,
         )
+        .with([("factor", factor), ("factor_sd", sd)])
     }
 
     fn lag(&self, log: usize, lag: f64, sd: f64) -> Finding {
@@ -354,6 +355,7 @@ impl Names<'_> {
             ),
             0,
         )
+        .with([("lag", lag), ("lag_sd", sd)])
     }
 
     fn drift(&self, log: Option<usize>, drift: &Effect) -> Finding {
@@ -378,6 +380,10 @@ impl Names<'_> {
             ),
             0,
         )
+        .with([
+            ("drift", drift.size), ("drift_sd", drift.sd),
+            ("logs", if log.is_some() { 1.0 } else { self.logs.len() as f64 }),
+        ])
     }
 }
 

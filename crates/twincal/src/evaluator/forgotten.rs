@@ -66,6 +66,8 @@ pub fn forgotten(twin: &Twin) -> Result<Option<Finding>> {
             format!("`{}` by up to {}", component.name, significant(*size, 2))
         })
         .collect();
+    let most = sizes.iter().filter(|(_, pip)| *pip >= NAMED);
+    let most = most.map(|(size, _)| *size).fold(0.0, f64::max);
     let (Some(first), count) = (named.first(), named.len()) else {
         return Ok(None);
     };
@@ -86,5 +88,6 @@ pub fn forgotten(twin: &Twin) -> Result<Option<Finding>> {
              off for {shown}{more} N·m (N), for some milliradians after a velocity reversal or in a cold robot; `twincal predict` follows the motion"
         ),
         count as u64,
-    )))
+    )
+    .with([("largest", most)])))
 }

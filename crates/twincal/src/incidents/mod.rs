@@ -160,7 +160,13 @@ pub fn incident_findings(log: &str, incidents: &[Incident]) -> Vec<Finding> {
             ),
         };
         let samples = own.iter().map(|i| i.samples).sum();
-        findings.push(Finding::new(Severity::Warning, code, log, message, samples));
+        let numbers = [
+            ("times", own.len() as f64),
+            ("first_from", own[0].span[0]),
+            ("first_to", own[0].span[1]),
+            ("first_torque", own[0].torque),
+        ];
+        findings.push(Finding::new(Severity::Warning, code, log, message, samples).with(numbers));
     }
     findings
 }

@@ -234,13 +234,13 @@ pub fn lag_findings(said: &Lag, lags: &Lags) -> Vec<Finding> {
             Lag::Unsaid => Severity::Degraded,
             _ => Severity::Warning,
         };
-        findings.push(Finding::new(
-            severity,
-            Code::TorqueLag,
-            &joint.joint,
-            message,
-            0,
-        ));
+        findings.push(
+            Finding::new(severity, Code::TorqueLag, &joint.joint, message, 0).with([
+                ("lag", joint.lag),
+                ("lag_sd", joint.sd),
+                ("lag_of_others", common),
+            ]),
+        );
     }
     findings.extend(late_logs(lags));
     findings
@@ -256,13 +256,10 @@ pub fn late_logs(lags: &Lags) -> Vec<Finding> {
             log.log,
             behind(own)
         );
-        Some(Finding::new(
-            Severity::Degraded,
-            Code::TorqueLag,
-            &log.log,
-            message,
-            0,
-        ))
+        Some(
+            Finding::new(Severity::Degraded, Code::TorqueLag, &log.log, message, 0)
+                .with([("lag", own[0]), ("lag_sd", own[1])]),
+        )
     };
     late.filter_map(finding).collect()
 }
@@ -287,7 +284,11 @@ fn common_finding(said: &Lag, lags: &Lags, common: [f64; 2]) -> Finding {
             ),
         ),
     };
-    Finding::new(severity, Code::TorqueLag, "", message, 0)
+    Finding::new(severity, Code::TorqueLag, "", message, 0).with([
+        ("lag", common[0]),
+        ("lag_sd", common[1]),
+        ("error_reduction", lags.gain),
+    ])
 }
 
 /// A lag in words.

@@ -140,13 +140,21 @@ fn unit_axis(joint: &JointDescription, findings: &mut Vec<Finding>) -> Result<[f
             "joint `{}`: axis {:?} has length {length:.6}; normalised to 1",
             joint.name, joint.axis
         );
-        findings.push(Finding::new(
-            Severity::Note,
-            Code::AxisNormalised,
-            &joint.name,
-            message,
-            1,
-        ));
+        findings.push(
+            Finding::new(
+                Severity::Note,
+                Code::AxisNormalised,
+                &joint.name,
+                message,
+                1,
+            )
+            .with([
+                ("length", length),
+                ("axis_x", joint.axis[0]),
+                ("axis_y", joint.axis[1]),
+                ("axis_z", joint.axis[2]),
+            ]),
+        );
     }
     Ok(scale(1.0 / length, joint.axis))
 }

@@ -108,13 +108,10 @@ fn lock(
         let message = format!(
             "joint `{name}` is fixed in the model anyway: its locked position {position} is not used"
         );
-        findings.push(Finding::new(
-            Severity::Note,
-            Code::LockedFixedJoint,
-            name,
-            message,
-            1,
-        ));
+        findings.push(
+            Finding::new(Severity::Note, Code::LockedFixedJoint, name, message, 1)
+                .with([("position", position)]),
+        );
         return Ok(None);
     }
     let limits = &joint.limits;
@@ -126,13 +123,20 @@ fn lock(
             limits.lower.unwrap_or(f64::NEG_INFINITY),
             limits.upper.unwrap_or(f64::INFINITY)
         );
-        findings.push(Finding::new(
-            Severity::Warning,
-            Code::LockedBeyondLimits,
-            name,
-            message,
-            1,
-        ));
+        findings.push(
+            Finding::new(
+                Severity::Warning,
+                Code::LockedBeyondLimits,
+                name,
+                message,
+                1,
+            )
+            .with([
+                ("position", position),
+                ("low", limits.lower.unwrap_or(f64::NAN)),
+                ("high", limits.upper.unwrap_or(f64::NAN)),
+            ]),
+        );
     }
     Ok(Some(Source::Still(position)))
 }

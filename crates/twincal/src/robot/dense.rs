@@ -3,8 +3,7 @@
 use super::RobotDescription;
 use super::bodies::Body;
 use super::spatial::dot;
-use crate::error::Code;
-use crate::error::{Finding, Severity};
+use crate::error::{Code, Finding, Severity};
 use crate::words::significant;
 use std::f64::consts::PI;
 
@@ -61,18 +60,19 @@ pub(super) fn report(
             significant(1e3 * radius, 2),
             significant(1e3 * (0.4_f64).sqrt() * ball, 2)
         );
-        findings.push(Finding::new(
-            Severity::Note,
-            Code::PointMass,
-            link,
-            message,
-            1,
-        ));
+        let numbers = [
+            ("mass", mass),
+            ("radius_of_gyration", radius),
+            ("radius_of_tungsten", 0.4_f64.sqrt() * ball),
+        ];
+        findings
+            .push(Finding::new(Severity::Note, Code::PointMass, link, message, 1).with(numbers));
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use crate::error::Code;
     use crate::robot::{
         Inertia, JointDescription, JointKind, LinkDescription, Robot, RobotDescription,
     };
@@ -109,7 +109,7 @@ mod tests {
             ],
         };
         let (_, findings) = Robot::new(description, &BTreeMap::new()).unwrap();
-        let points = findings.iter().filter(|f| f.code == super::Code::PointMass);
+        let points = findings.iter().filter(|f| f.code == Code::PointMass);
         points.map(|finding| finding.message.clone()).collect()
     }
 

@@ -121,7 +121,8 @@ pub(crate) fn check(
                  of its joint or as the tensor of another link; give the link its own in the model where you know it"
             ),
             1,
-        )));
+        )
+        .with([("mass", *mass)])));
     }
     let Some(problem) = impossible(tensor, hollow) else {
         return Ok(None);
@@ -136,13 +137,14 @@ pub(crate) fn check(
     }
     let message =
         format!("link `{link}`: {problem}; used as it is because unphysical inertias are allowed");
-    Ok(Some(Finding::new(
-        Severity::Warning,
-        Code::UnphysicalInertia,
-        link,
-        message,
-        1,
-    )))
+    let ([i1, i2, i3], _) = principal_axes(tensor);
+    Ok(Some(
+        Finding::new(Severity::Warning, Code::UnphysicalInertia, link, message, 1).with([
+            ("principal_moment_1", i1),
+            ("principal_moment_2", i2),
+            ("principal_moment_3", i3),
+        ]),
+    ))
 }
 
 fn refuse<T>(link: &str, problem: String, remedy: &str) -> Result<T> {

@@ -93,6 +93,7 @@ impl Base {
         };
         let shown = |gravity: [f64; 3]| gravity.map(|g| significant(g, 3)).join(", ");
         let (joint, worst) = most_helped(robot, before, after);
+        let ([x, y, z], [roll, pitch, yaw]) = (self.gravity, self.rpy);
         Finding::new(
             Severity::Degraded,
             Code::BaseOrientation,
@@ -109,6 +110,11 @@ impl Base {
             ),
             0,
         )
+        .with([
+            ("angle", self.angle), ("explained", 1.0 - worst[1]),
+            ("explained_before", 1.0 - worst[0]), ("gravity_x", x), ("gravity_y", y),
+            ("gravity_z", z), ("roll", roll), ("pitch", pitch), ("yaw", yaw),
+        ])
     }
 }
 

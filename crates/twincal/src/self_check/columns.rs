@@ -64,7 +64,7 @@ fn copied(
                 message,
                 count,
             );
-            findings.push(finding);
+            findings.push(finding.with([("share", share(3, a, b))]));
         }
     }
     findings
@@ -89,6 +89,7 @@ fn constant(robot: &Robot, log: &str, sample: &Sample, parts: &Parts) -> Vec<Fin
             );
             let count = sample.len as u64;
             Finding::new(Severity::Degraded, Code::TorqueConstant, names[joint], message, count)
+                .with([("torque", sample.channels[3][joint][0]), ("torque_needed_sd", size)])
         })
         .collect()
 }

@@ -143,6 +143,8 @@ impl Factors {
 pub(super) fn missing_finding(log: &str, part: Part, factors: &Factors) -> Finding {
     let factor = |e: Option<Estimate>| e.map_or("unknown".to_owned(), shown);
     let (gravity, inertia) = (factor(factors.gravity), factor(factors.inertia));
+    let number = |e: Option<Estimate>| e.map_or([f64::NAN; 2], |e| [e.value, e.error]);
+    let (of_gravity, of_inertia) = (number(factors.gravity), number(factors.inertia));
     let (code, looks_like) = match part {
         Part::NoModel => (
             Code::ModelTorque,
@@ -163,6 +165,10 @@ pub(super) fn missing_finding(log: &str, part: Part, factors: &Factors) -> Findi
         ),
         0,
     )
+    .with([
+        ("gravity_factor", of_gravity[0]), ("gravity_factor_sd", of_gravity[1]),
+        ("inertia_factor", of_inertia[0]), ("inertia_factor_sd", of_inertia[1]),
+    ])
 }
 
 /// Findings on factors that all joints have in common; none where a part of the torque is missing.
@@ -178,13 +184,13 @@ pub(super) fn factor_findings(factors: &Factors) -> Vec<Finding> {
             significant(ratio.value.max(1.0 / ratio.value).sqrt(), 3),
             if ratio.value > 1.0 { "long" } else { "short" }
         );
-        return vec![Finding::new(
-            Severity::Degraded,
-            Code::ClockScale,
-            "",
-            message,
-            0,
-        )];
+        return vec![
+            Finding::new(Severity::Degraded, Code::ClockScale, "", message, 0).with([
+                ("inertia_factor", ratio.value),
+                ("inertia_factor_sd", ratio.error),
+                ("time_factor", ratio.value.sqrt()),
+            ]),
+        ];
     }
     let Some(factor) = factors.common() else {
         return Vec::new();
@@ -195,13 +201,10 @@ pub(super) fn factor_findings(factors: &Factors) -> Vec<Finding> {
         shown(factor),
         significant(1.0 / factor.value, 3)
     );
-    vec![Finding::new(
-        Severity::Degraded,
-        Code::TorqueScale,
-        "",
-        message,
-        0,
-    )]
+    vec![
+        Finding::new(Severity::Degraded, Code::TorqueScale, "", message, 0)
+            .with([("factor", factor.value), ("factor_sd", factor.error)]),
+    ]
 }
 
 fn shown(estimate: Estimate) -> String {

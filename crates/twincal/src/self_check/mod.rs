@@ -356,7 +356,9 @@ fn scales(robot: &Robot, sample: &Sample, explained: &[Option<Explained>]) -> Ve
                 None => continue,
             },
         };
-        scales.push(Scale::new(Some(name), problem, factor).times(gain));
+        let effort = efforts[joint].filter(|_| gain.is_none());
+        let scale = Scale::new(Some(name), problem, factor).times(gain);
+        scales.push(scale.beyond(effort));
     }
     if let Some(times) = far_off(explained).filter(|_| scales.is_empty()) {
         let size = match times > 1.0 {
@@ -401,7 +403,20 @@ struct Scale {
 
 impl Scale {
     fn times(self, times: Option<f64>) -> Self {
-        Self { times, ..self }
+        let finding = self.finding.with(times.map(|times| ("factor", times)));
+        Self {
+            finding,
+            times,
+            ..self
+        }
+    }
+
+    /// Largest torque, and the limit that it is beyond.
+    fn beyond(self, effort: Option<[f64; 2]>) -> Self {
+        let of =
+            |[largest, limit]: [f64; 2]| [("largest_torque", largest), ("effort_limit", limit)];
+        let finding = self.finding.with(effort.into_iter().flat_map(of));
+        Self { finding, ..self }
     }
 
     /// See [`Look::sizes`].
@@ -493,6 +508,7 @@ fn signs_and_order(
     let names = robot.joint_names();
     let mut findings = Vec::new();
     let mut moved = Vec::new();
+    let known = |left: &Option<Explained>| left.map_or(f64::NAN, |e| 1.0 - e.left);
     let share = |left: &Option<Explained>| {
         left.map_or_else(String::new, |e| format!("{:.0} %", 100.0 * (1.0 - e.left)))
     };
@@ -544,13 +560,15 @@ fn signs_and_order(
                 share(&after[joint])
             ),
             0,
-        ));
+        )
+        .with([("explained", known(&after[joint])), ("explained_before", known(&before[joint]))]));
     }
     if !moved.is_empty() {
-        let all = |explained: &[Option<Explained>]| {
+        let least = |explained: &[Option<Explained>]| {
             let worst = explained.iter().flatten().map(|e| e.left);
-            format!("{:.0} %", 100.0 * (1.0 - worst.fold(0.0, f64::max)))
+            1.0 - worst.fold(0.0, f64::max)
         };
+        let all = |explained| format!("{:.0} %", 100.0 * least(explained));
         findings.push(Finding::new(
             Severity::Degraded,
             Code::JointOrder,
@@ -563,7 +581,8 @@ fn signs_and_order(
                 all(before)
             ),
             moved.len() as u64,
-        ));
+        )
+        .with([("explained", least(after)), ("explained_before", least(before))]));
     }
     findings
 }

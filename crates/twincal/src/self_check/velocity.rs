@@ -47,6 +47,7 @@ fn finding(log: &str, slope: f64) -> Finding {
         ),
         0,
     )
+    .with([("slope", slope), ("time_factor", slope)])
 }
 
 #[cfg(test)]

@@ -311,7 +311,11 @@ fn wants_generic(
                 generic::count(joints, parallel)
             ),
             0,
-        ));
+        )
+        .with([
+            ("joints", joints.len() as f64), ("terms", generic::count(joints, parallel)),
+            ("joints_at_most", GENERIC_JOINTS as f64),
+        ]));
     }
     let count = settings.terms.len() as f64
         + if generic {

@@ -79,7 +79,8 @@ pub(super) fn files(folder: &Path) -> Result<(Vec<PathBuf>, Vec<Finding>)> {
         "the bag has no metadata.yaml: its {} files were taken in the order of their names; `ros2 bag reindex` writes it",
         files.len()
     );
-    let finding = Finding::new(Severity::Warning, Code::NoMetadata, name, message, 0);
+    let finding = Finding::new(Severity::Warning, Code::NoMetadata, name, message, 0)
+        .with([("files", files.len() as f64)]);
     Ok((
         files.into_iter().map(|(_, path)| path).collect(),
         vec![finding],

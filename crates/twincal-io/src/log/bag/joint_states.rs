@@ -524,8 +524,9 @@ impl<'a> JointStates<'a> {
 
     fn say(&self, findings: &mut Vec<Finding>) {
         let messages = self.rows as f64;
-        let mut say = |severity, code: Code, message: String, count| {
-            findings.push(Finding::new(severity, code, self.file, message, count));
+        let mut say = |severity, code: Code, message: String, count, numbers: &[_]| {
+            let finding = Finding::new(severity, code, self.file, message, count);
+            findings.push(finding.with(numbers.iter().copied()));
         };
         if self.states > 0 {
             say(
@@ -537,6 +538,7 @@ impl<'a> JointStates<'a> {
                     self.lag / self.states as f64 / 1e6
                 ),
                 0,
+                &[("lag", self.lag / self.states as f64 / 1e9)],
             );
         }
         if self.options.torque_source() == TorqueSource::Joint {
@@ -545,6 +547,7 @@ impl<'a> JointStates<'a> {
                 Code::EffortIsJointTorque,
                 "the logged torque (effort[], or what [columns] tau names) counts as torque on the joint's side of the gear, N·m (N for sliders); if it is of the motor or a current, say so with [[log]] torque".into(),
                 0,
+                &[],
             );
         }
         if self.late > 0 {
@@ -562,6 +565,7 @@ impl<'a> JointStates<'a> {
                     self.latest as f64 / 1e6
                 ),
                 self.late,
+                &[("messages", messages), ("latest", self.latest as f64 / 1e9)],
             );
         }
         let foreign = &self.foreign.in_order;
@@ -574,6 +578,7 @@ impl<'a> JointStates<'a> {
                     quoted(foreign)
                 ),
                 foreign.len() as u64,
+                &[],
             );
         }
     }

@@ -352,7 +352,8 @@ impl Mapping {
         let stamped = self.topics.iter().filter_map(|topic| topic.found.as_ref());
         let stamped = stamped.filter(|found| matches!(found.time, Some(Time::Path(..))));
         let lags = stamped.map(|found| found.lag / found.messages.max(1) as f64);
-        let beside = match lags.chain(states).fold(0.0, f64::max) {
+        let others = lags.chain(states).fold(0.0, f64::max);
+        let beside = match others {
             lag if lag > TOGETHER_NS => format!(
                 "; the stamps of the others are {:.3} ms before that clock on average, so that this topic may be late by as much beside them: [columns] time = \"log_time\" \
                  takes that clock for all mapped topics",
@@ -401,7 +402,12 @@ impl Mapping {
                     ),
                 ),
             };
-            findings.push(Finding::new(severity, code, file, message, 0));
+            let lag = match code {
+                Code::TimeSource => Some(("lag", found.lag / found.messages as f64 / 1e9)),
+                _ if topic.log_time || others <= TOGETHER_NS => None,
+                _ => Some(("lag_of_others", others / 1e9)),
+            };
+            findings.push(Finding::new(severity, code, file, message, 0).with(lag));
             let ordered = found.by_name.iter().zip(&topic.targets);
             let ordered = ordered.filter(|(by_name, _)| **by_name == Some(false));
             let paths: BTreeSet<&str> = ordered.map(|(_, t)| t.source.text.as_str()).collect();

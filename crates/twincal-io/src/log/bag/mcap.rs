@@ -105,13 +105,16 @@ pub(super) fn read(
             reader.chunks,
             reader.first_damage.unwrap_or_default()
         );
-        findings.push(Finding::new(
-            Severity::Degraded,
-            Code::DamagedChunks,
-            file,
-            message,
-            reader.damaged,
-        ));
+        findings.push(
+            Finding::new(
+                Severity::Degraded,
+                Code::DamagedChunks,
+                file,
+                message,
+                reader.damaged,
+            )
+            .with([("chunks", reader.chunks as f64)]),
+        );
     }
     if reader.damaged == 0 && reader.is_changed {
         let (severity, values) = match reader.unchecked {
@@ -131,16 +134,18 @@ pub(super) fn read(
         End::BehindData => Some((
             Severity::Warning,
             "the file ends behind its messages, without its index; none was lost".to_owned(),
+            None,
         )),
         End::Cut(byte) => Some((
             Severity::Degraded,
             format!(
                 "the file is cut off at byte {byte}: what stood whole before was read; `mcap recover` makes a whole file of it"
             ),
+            Some(("byte", byte as f64)),
         )),
     };
-    if let Some((severity, message)) = cut {
-        findings.push(Finding::new(severity, Code::Truncated, file, message, 0));
+    if let Some((severity, message, byte)) = cut {
+        findings.push(Finding::new(severity, Code::Truncated, file, message, 0).with(byte));
     }
     Ok(findings)
 }

@@ -259,7 +259,8 @@ impl Merged {
                 "joints or channels come in messages of their own: {others} brought to the stamps of {slowest} by linear interpolation; {lost} of {rows} rows lie outside or in gaps and are NaN"
             ),
             *lost as u64,
-        ))
+        )
+        .with([("rows", *rows as f64)]))
     }
 }
 

@@ -64,13 +64,10 @@ impl LastFields {
         } else {
             return None;
         };
-        Some(Finding::new(
-            Severity::Warning,
-            Code::CutRow,
-            file,
-            message,
-            1,
-        ))
+        Some(
+            Finding::new(Severity::Warning, Code::CutRow, file, message, 1)
+                .with([("line", number as f64)]),
+        )
     }
 }
 

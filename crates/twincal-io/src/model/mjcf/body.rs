@@ -438,6 +438,7 @@ fn unnamed_joint(name: &str, body: &str, number: usize) -> Finding {
         number + 1
     );
     Finding::new(Severity::Note, Code::UnnamedJoint, name, message, 1)
+        .with([("number", (number + 1) as f64)])
 }
 
 /// Says that a joint's dry friction is left out.
@@ -447,4 +448,5 @@ fn unused_friction(name: &str, friction: f64) -> Finding {
          friction is a candidate"
     );
     Finding::new(Severity::Note, Code::FrictionlossNotUsed, name, message, 1)
+        .with([("friction", friction)])
 }

@@ -116,13 +116,10 @@ fn equality<'a>(tree: &mut Tree<'a>, joints: &Joints, element: &'a Element) -> R
                 "joint `{first}` follows `{second}` (equality): {} · q + {offset}",
                 poly[1]
             );
-            tree.findings.push(Finding::new(
-                Severity::Note,
-                Code::MimicFromEquality,
-                first,
-                message,
-                1,
-            ));
+            tree.findings.push(
+                Finding::new(Severity::Note, Code::MimicFromEquality, first, message, 1)
+                    .with([("multiplier", poly[1]), ("offset", offset)]),
+            );
             return Ok(());
         }
     }
@@ -185,13 +182,10 @@ fn actuator<'a>(tree: &mut Tree<'a>, joints: &Joints, element: &'a Element) -> R
             "actuator `{name}` has gear {gear}: torque columns are those of joint `{joint}`, which is {gear} × the actuator's force; \
              the gear itself changes no nominal torque"
         );
-        tree.findings.push(Finding::new(
-            Severity::Note,
-            Code::ActuatorGear,
-            joint,
-            message,
-            1,
-        ));
+        tree.findings.push(
+            Finding::new(Severity::Note, Code::ActuatorGear, joint, message, 1)
+                .with([("gear", gear)]),
+        );
     }
     Ok(())
 }

@@ -14,6 +14,7 @@ const FEWEST: f64 = 5.0;
 /// Of the moving rows of log `log` within the training motion; `memory` rows of each joint count as one.
 pub(in crate::calibrate) fn finding(log: &str, within: &Scores, memory: &[f64]) -> Option<Finding> {
     let joints = within.joints.iter().zip(memory);
+    let mut least = 1.0_f64;
     let low: Vec<String> = joints
         .filter(|(score, memory)| {
             let independent = score.rows as f64 / *memory;
@@ -21,6 +22,7 @@ pub(in crate::calibrate) fn finding(log: &str, within: &Scores, memory: &[f64]) 
             independent >= FEWEST && score.coverage95 + CLEAR * sd < LEVEL
         })
         .map(|(score, _)| {
+            least = least.min(score.coverage95);
             format!(
                 "{:.0} % of joint `{}`",
                 100.0 * score.coverage95,
@@ -41,6 +43,7 @@ pub(in crate::calibrate) fn finding(log: &str, within: &Scores, memory: &[f64]) 
             ),
             low.len() as u64,
         )
+        .with([("coverage95", least), ("level", LEVEL)])
     })
 }
 

@@ -75,6 +75,7 @@ fn finding(what: What, log: &str, joint: &str, change: f64, sd: f64) -> Finding 
         ),
         0,
     )
+    .with([("change", change), ("residual_sd", sd)])
 }
 
 fn warms(what: What, log: &str, joint: &str, warming: &Warming) -> Finding {
@@ -104,6 +105,10 @@ fn warms(what: What, log: &str, joint: &str, warming: &Warming) -> Finding {
         ),
         0,
     )
+    .with([
+        ("slope", *slope), ("slope_sd", *error), ("temperature_low", *low),
+        ("temperature_high", *high), ("residual_sd", *sd),
+    ])
 }
 
 /// How the residual goes with the temperature.

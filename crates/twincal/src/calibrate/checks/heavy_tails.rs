@@ -50,7 +50,11 @@ pub(in crate::calibrate) fn findings(
                 significant(sd, 3)
             ),
             count as u64,
-        ));
+        )
+        .with([
+            ("rows", residual.len() as f64), ("share", count as f64 / residual.len() as f64),
+            ("robust_sd", sd), ("limit_in_sd", FAR),
+        ]));
     }
     findings
 }

@@ -179,6 +179,7 @@ fn not_scored(held_out: &[LeftOut<'_>], noise: &[JointNoise]) -> Finding {
         ),
         held_out.len() as u64,
     )
+    .with([("independent_rows", most), ("needed", LEAST_EFFECTIVE_ROWS)])
 }
 
 /// `twin` with posterior and noise of another fit, and its rivals.

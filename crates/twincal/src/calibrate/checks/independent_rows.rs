@@ -78,6 +78,7 @@ pub(in crate::calibrate) fn require(
             ),
             rows as u64,
         )
+        .with([("independent_rows", independent), ("needed", LEAST_EFFECTIVE_ROWS)])
     };
     let most = enough.iter().map(|(_, [_, independent])| *independent);
     Ok(Counted {

@@ -26,6 +26,7 @@ pub(in crate::calibrate) fn findings(robot: &Robot, plug_in: &PlugIn) -> Vec<Fin
                 ),
                 0,
             )
+            .with([("misfit", share)])
         })
         .collect()
 }

@@ -68,31 +68,37 @@ pub(in crate::calibrate) fn findings(
                     z.abs()
                 ),
                 0,
-            ));
+            )
+            .with([("mean", mean), ("sd", sd), ("prior_sd", prior), ("distance_in_sd", z.abs())]));
         }
     }
-    if let Some((shape, scale)) = settings.noise
-        && shape >= SAYS_SOMETHING
-        && posterior.noise.is_finite()
-    {
-        // 1/φ ~ Gamma(shape, rate = scale)
-        let x = scale / posterior.noise;
-        if gamma_lr(shape, x).min(gamma_ur(shape, x)) < TAIL {
-            findings.push(Finding::new(
-                Severity::Warning,
-                Code::PriorConflict,
-                "prior.noise",
-                format!(
-                    "the noise variance is {} (N·m)², which prior.noise holds for impossible (it expects about {}): \
-                     leave prior.noise out, or look at the torque's unit",
-                    significant(posterior.noise, 4),
-                    significant(scale / shape, 4)
-                ),
-                0,
-            ));
-        }
-    }
+    findings.extend(impossible_noise(settings, posterior.noise));
     findings
+}
+
+/// A noise variance that the prior of the noise holds for impossible.
+fn impossible_noise(settings: &PriorSettings, noise: f64) -> Option<Finding> {
+    let (shape, scale) = settings.noise?;
+    if shape < SAYS_SOMETHING || !noise.is_finite() {
+        return None;
+    }
+    // 1/φ ~ Gamma(shape, rate = scale)
+    let x = scale / noise;
+    (gamma_lr(shape, x).min(gamma_ur(shape, x)) < TAIL).then(|| {
+        Finding::new(
+            Severity::Warning,
+            Code::PriorConflict,
+            "prior.noise",
+            format!(
+                "the noise variance is {} (N·m)², which prior.noise holds for impossible (it expects about {}): \
+                 leave prior.noise out, or look at the torque's unit",
+                significant(noise, 4),
+                significant(scale / shape, 4)
+            ),
+            0,
+        )
+        .with([("noise_variance", noise), ("noise_variance_of_prior", scale / shape)])
+    })
 }
 
 #[cfg(test)]

@@ -121,7 +121,8 @@ pub(in crate::calibrate) fn findings<'a>(terms: impl Iterator<Item = Sds<'a>>) -
              likelihood says"
         ),
         found.len() as u64,
-    )]
+    )
+    .with([("ratio", *ratio)])]
 }
 
 #[cfg(test)]

@@ -107,7 +107,11 @@ pub(in crate::calibrate) fn findings(
                     shown(point.mean[k])
                 ),
                 0,
-            );
+            )
+            .with([
+                ("change_in_sd", moved), ("cutoff", point.cutoff_hz), ("mean", posterior.mean[k]),
+                ("mean_at_cutoff", point.mean[k]),
+            ]);
             findings.push((moved, finding));
         }
     }

@@ -84,5 +84,6 @@ fn finding(mut found: Vec<(&str, f64)>, cause: &Cause) -> Option<Finding> {
              some and too narrow at others; try {key} = true, and keep it where the held-out error does not grow"
         ),
         found.len() as u64,
-    ))
+    )
+    .with([("ratio", *ratio)]))
 }

@@ -30,7 +30,8 @@ pub(in crate::calibrate) fn findings(
                  probabilities and coefficients may change with the seed; raise inference.draws"
             ),
             chains as u64,
-        ));
+        )
+        .with([("r_hat", r_hat), ("limit", R_HAT_LIMIT)]));
     }
     if !fitted.fit.converged {
         findings.push(Finding::new(
@@ -59,7 +60,8 @@ pub(in crate::calibrate) fn findings(
                         time.sqrt()
                     ),
                     0,
-                ));
+                )
+                .with([("autocorrelation_time", time), ("sd_factor", time.sqrt())]));
             }
         }
     }

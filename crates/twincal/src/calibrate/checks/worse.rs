@@ -18,7 +18,11 @@ pub(in crate::calibrate) fn findings(robot: &Robot, scores: &Scores) -> Vec<Find
             significant(scores.rmse_calibrated, 3),
             significant(scores.rmse_nominal, 3)
         );
-        return vec![finding(String::new(), message)];
+        return vec![finding(
+            String::new(),
+            message,
+            [scores.rmse_calibrated, scores.rmse_nominal],
+        )];
     }
     let worse = (scores.joints.iter().enumerate())
         .filter(|(_, score)| ratio([score.rmse_nominal, score.rmse_calibrated]) > WORSE);
@@ -30,7 +34,7 @@ pub(in crate::calibrate) fn findings(robot: &Robot, scores: &Scores) -> Vec<Find
             significant(score.rmse_calibrated, 3),
             significant(score.rmse_nominal, 3)
         );
-        finding(name.clone(), message)
+        finding(name.clone(), message, [score.rmse_calibrated, score.rmse_nominal])
     });
     told.collect()
 }
@@ -50,11 +54,13 @@ pub(in crate::calibrate) fn of_compact(losses: Option<[Loss; 2]>) -> Option<Find
             significant(average.rmse, 3)
         );
         Finding::new(Severity::Warning, Code::CompactWorse, "", message, 0)
+            .with([("rms_compact", own.rmse), ("rms_calibrated", average.rmse)])
     })
 }
 
-fn finding(subject: String, message: String) -> Finding {
+fn finding(subject: String, message: String, [calibrated, nominal]: [f64; 2]) -> Finding {
     Finding::new(Severity::Warning, Code::WorseThanModel, subject, message, 0)
+        .with([("rms_calibrated", calibrated), ("rms_nominal", nominal)])
 }
 
 #[cfg(test)]

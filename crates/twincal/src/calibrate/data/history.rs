@@ -85,13 +85,10 @@ pub(in crate::calibrate) fn follow(
             _ => "no joint travels far enough".to_owned(),
         };
         let message = format!("`{}` of friction is no candidate: {why}", family.word());
-        findings.push(Finding::new(
-            Severity::Note,
-            Code::HistoryNotFollowed,
-            "",
-            message,
-            0,
-        ));
+        findings.push(
+            Finding::new(Severity::Note, Code::HistoryNotFollowed, "", message, 0)
+                .with((!few).then_some(("joints", dof as f64))),
+        );
     }
     if !bends && !warms {
         history.clear();

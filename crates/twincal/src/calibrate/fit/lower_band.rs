@@ -151,6 +151,7 @@ pub(in crate::calibrate) fn lowered(few: &TooFew, cutoff_hz: f64) -> Finding {
         few.cutoff_hz
     );
     Finding::new(Severity::Warning, Code::LowerBand, "", message, 0)
+        .with([("cutoff", cutoff_hz), ("cutoff_tried", few.cutoff_hz)])
 }
 
 /// Half, a quarter and so on of a cut-off in two digits, not below [`LEAST`].

@@ -136,6 +136,7 @@ pub(in crate::calibrate) fn finding(names: &[&str], open: Option<f64>) -> Option
                 message,
                 names.len() as u64,
             )
+            .with([("change_in_sd", moves)])
         }
     })
 }

@@ -115,6 +115,11 @@ impl Seen {
             ),
             0,
         )
+        .with([
+            ("periods", *periods), ("amplitude", ripple.amplitude), ("share", ripple.share),
+            ("periods_forwards", ripple.forwards as f64),
+            ("periods_backwards", ripple.backwards as f64), ("nats", ripple.gain),
+        ])
     }
 }
 

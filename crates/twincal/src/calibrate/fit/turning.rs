@@ -164,6 +164,10 @@ impl Way {
             ),
             0,
         )
+        .with([
+            ("velocity", *velocity), ("usual_velocity", usual), ("error_reduction", *share),
+            ("nats", *gain),
+        ])
     }
 }
 

@@ -79,15 +79,12 @@ pub(in crate::calibrate) fn weigh(
     }
     for (name, (count, all)) in robot.joint_names().into_iter().zip(down) {
         if count > 0 {
-            findings.push(Finding::new(
-                Severity::Note,
-                Code::OutliersWeighed,
-                name,
-                format!(
-                    "joint `{name}`: {count} of {all} rows count less than a quarter (noise.robust)"
-                ),
-                count as u64,
-            ));
+            let message = format!(
+                "joint `{name}`: {count} of {all} rows count less than a quarter (noise.robust)"
+            );
+            let code = Code::OutliersWeighed;
+            let finding = Finding::new(Severity::Note, code, name, message, count as u64);
+            findings.push(finding.with([("rows", all as f64)]));
         }
     }
     Ok(spreads)

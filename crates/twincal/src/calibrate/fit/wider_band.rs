@@ -171,5 +171,11 @@ fn finding(told: &[(&str, Judged)], pipeline: &Pipeline, cutoff_hz: f64) -> Opti
             largest(|judged| judged.variances),
         ),
         0,
-    ))
+    )
+    .with([
+        ("cutoff", cutoff_hz), ("usual_cutoff", narrow), ("memory", longest.1.time / cutoff_hz),
+        ("periodogram_distance", largest(|judged| judged.cumulated)),
+        ("periodogram_limit", CUMULATED), ("variance_ratio", largest(|judged| judged.variances)),
+        ("variance_ratio_limit", VARIANCES),
+    ]))
 }

@@ -45,7 +45,10 @@ fn of_factor(factor: f64, sd: f64, from_currents: bool) -> Option<Finding> {
         significant(sd, 1),
         significant(1.0 / factor, 3)
     );
-    Some(Finding::new(severity, Code::CommonFactor, "", message, 0))
+    Some(
+        Finding::new(severity, Code::CommonFactor, "", message, 0)
+            .with([("factor", factor), ("factor_sd", sd)]),
+    )
 }
 
 #[cfg(test)]

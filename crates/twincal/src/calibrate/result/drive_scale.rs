@@ -129,7 +129,8 @@ impl DriveScale {
                  centres of mass and inertias; log two known payloads ([[log]] payload) to be rid of it, or set prior.drive_gain"
             ),
             0,
-        ))
+        )
+        .with([("gain_sd", self.sd)]))
     }
 }
 
@@ -153,6 +154,7 @@ pub(in crate::calibrate) fn ignored(
             ),
             0,
         )
+        .with([("gain_sd", sd)])
     })
 }
 

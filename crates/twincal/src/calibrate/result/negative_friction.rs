@@ -107,7 +107,11 @@ fn told(
              the twin would drive the joint; log faster motion, or leave the family quadratic_friction out of [library] families"
         ),
         0,
-    ))
+    )
+    .with([
+        ("coulomb", dry), ("viscous", viscous), ("quadratic", quadratic), ("velocity", speed),
+        ("velocity_limit", limit.unwrap_or(f64::NAN)), ("velocity_logged", logged),
+    ]))
 }
 
 #[cfg(test)]

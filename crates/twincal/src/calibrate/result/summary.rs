@@ -394,13 +394,16 @@ fn findings_of_posterior(groups: &[Group], problem: &Problem, sums: &Sums) -> Ve
         } else {
             Severity::Warning
         };
-        findings.push(Finding::new(
-            severity,
-            Code::AlikeInData,
-            group.members.join(", "),
-            group.words.clone(),
-            group.members.len() as u64,
-        ));
+        findings.push(
+            Finding::new(
+                severity,
+                Code::AlikeInData,
+                group.members.join(", "),
+                group.words.clone(),
+                group.members.len() as u64,
+            )
+            .with([("pip", group.pip)]),
+        );
     }
     findings
 }

@@ -188,6 +188,7 @@ fn finding(link: &str, share: f64, chance: f64) -> Finding {
         ),
         0,
     )
+    .with([("share", share), ("chance", chance)])
 }
 
 /// Positive mass, and moments that a distribution of mass can have; without `whole` only the one about z.

@@ -173,7 +173,8 @@ fn off(
                 "signal.rate_hz = {rate} has no effect: with signal.cutoff_hz = 0 every input row is one row; leave one of them out"
             ),
             0,
-        ));
+        )
+        .with([("rate", rate)]));
     }
     let intervals: Vec<f64> = logs
         .iter()

@@ -66,7 +66,11 @@ pub(crate) fn velocity_resolution(
                 facts.name, pipeline.motion_cutoff_hz, significant(position, 2), significant(velocity, 2), significant(acceleration, 2)
             ),
             0,
-        ));
+        )
+        .with([
+            ("motion_cutoff", pipeline.motion_cutoff_hz), ("position_noise", position),
+            ("velocity_noise", velocity), ("acceleration_noise", acceleration),
+        ]));
     }
     let stepping = step.map_or(0.0, |step| 4.0 * pipeline.motion_cutoff_hz * step);
     if let Some(step) = step.filter(|_| stepping > pipeline.coulomb_velocity) {
@@ -81,7 +85,11 @@ pub(crate) fn velocity_resolution(
                 facts.name, significant(step, 3), significant(velocity, 2), significant(acceleration, 2), significant(stepping, 3)
             ),
             0,
-        ));
+        )
+        .with([
+            ("step", step), ("velocity_noise", velocity), ("acceleration_noise", acceleration),
+            ("step_velocity", stepping),
+        ]));
     }
     stepping.max(3.0 * travel)
 }

@@ -177,7 +177,8 @@ fn motion_cutoff(cutoff: f64, lowest_rate: f64, findings: &mut Vec<Finding>) -> 
                 "the motion filter's cut-off is {motion_cutoff:.3} Hz instead of 4 x {cutoff} Hz: the slowest log has only {lowest_rate:.3} Hz"
             ),
             0,
-        ));
+        )
+        .with([("cutoff", motion_cutoff), ("cutoff_wanted", 4.0 * cutoff), ("rate", lowest_rate)]));
     }
     motion_cutoff
 }
@@ -216,7 +217,10 @@ fn replaced_velocity(facts: &JointFacts, noise: [f64; 2]) -> Finding {
         "joint `{name}`: the logged velocity has a noise of {logged} per s (after the motion filter), the change of position {travel}: velocity is \
          taken from position; [signal] velocity = \"logged\" takes the log's"
     );
-    Finding::new(Severity::Warning, Code::NoisyVelocity, name, message, 0)
+    Finding::new(Severity::Warning, Code::NoisyVelocity, name, message, 0).with([
+        ("velocity_noise", noise[0]),
+        ("velocity_noise_of_position", noise[1]),
+    ])
 }
 
 /// Sets the coarsest clock at which motion may be held, where it thins any log.
@@ -283,6 +287,11 @@ fn described(pipeline: &Pipeline, clocks: &Clocks) -> Finding {
         ),
         0,
     )
+    .with([
+        ("cutoff", cutoff), ("half_length", column_half_seconds(cutoff)),
+        ("noise_gain", noise_gain(&taps)), ("motion_cutoff", motion_cutoff),
+        ("motion_half_length", motion_half_seconds(motion_cutoff)), ("rate", kept),
+    ])
 }
 
 /// Rate of kept rows, after checking that the filters fit the logs.
@@ -317,7 +326,8 @@ fn limits(
             "",
             format!("rows are kept at the slowest log's rate of {lowest_rate:.3} Hz instead of {rate} Hz"),
             0,
-        ));
+        )
+        .with([("rate", lowest_rate), ("rate_wanted", rate)]));
         rate = lowest_rate;
     }
     if rate < 2.0 * cutoff {
@@ -327,7 +337,8 @@ fn limits(
             "",
             format!("rows at {rate} Hz are below twice the cut-off of {cutoff} Hz: torque between them folds into the estimates as noise"),
             0,
-        ));
+        )
+        .with([("rate", rate), ("cutoff", cutoff)]));
     }
     let needed = 2.0
         * (column_half_seconds(cutoff)

@@ -177,7 +177,8 @@ fn finite_rows(
                 kept.len()
             ),
             lost as u64,
-        ));
+        )
+        .with([("every", every as f64), ("rows", kept.len() as f64)]));
         cut_before.fill(false);
     } else if lost > 0 {
         let worst: Vec<String> = channels
@@ -203,7 +204,8 @@ fn finite_rows(
                 worst.join(", ")
             ),
             lost as u64,
-        ));
+        )
+        .with([("rows", samples as f64), ("share", share), ("limit", LARGEST)]));
     }
     (kept, cut_before)
 }
@@ -272,13 +274,17 @@ fn median_interval(
         ),
     };
     if every_row {
-        findings.push(Finding::new(
-            Severity::Warning,
-            Code::ImplausibleTimeStep,
-            &log.name,
-            format!("{problem}; {remedy}. With the filter off time is only copied"),
-            0,
-        ));
+        findings.push(
+            Finding::new(
+                Severity::Warning,
+                Code::ImplausibleTimeStep,
+                &log.name,
+                format!("{problem}; {remedy}. With the filter off time is only copied"),
+                0,
+            )
+            .with([("interval", interval)])
+            .with(guess.map(|(.., size)| ("rate", 1.0 / (interval * size)))),
+        );
         return Ok(interval);
     }
     Err(match guess {
@@ -347,14 +353,15 @@ fn cut(
     runs.push(run);
     runs.retain(|run| !run.rows.is_empty());
 
-    let mut say = |severity, code: Code, message: String, count| {
-        findings.push(Finding::new(severity, code, &log.name, message, count));
+    let mut say = |severity, code: Code, message: String, count, numbers: &[_]| {
+        let finding = Finding::new(severity, code, &log.name, message, count);
+        findings.push(finding.with(numbers.iter().copied()));
     };
     if same > 0 {
         let text = format!(
             "{same} rows repeat the stamp and all values of the row before and were dropped"
         );
-        say(Severity::Note, Code::DuplicateRows, text, same);
+        say(Severity::Note, Code::DuplicateRows, text, same, &[]);
     }
     if contradicting > 0 {
         let share = contradicting as f64 / log.time.len() as f64;
@@ -367,25 +374,28 @@ fn cut(
             "{contradicting} rows ({:.3} %) repeat a stamp with other values; the first of each was kept: look at how the log was joined",
             100.0 * share
         );
-        say(severity, Code::ContradictingDuplicates, text, contradicting);
+        let (code, numbers) = (Code::ContradictingDuplicates, [("share", share)]);
+        say(severity, code, text, contradicting, &numbers);
     }
     if crowded > 0 {
         let text = format!(
             "{crowded} rows follow the row before by less than {:.0} % of the median step and were dropped: stamp at the source, not at arrival",
             100.0 * CROWDED
         );
-        say(Severity::Warning, Code::CrowdedStamps, text, crowded);
+        let (code, numbers) = (Code::CrowdedStamps, [("share_of_step", CROWDED)]);
+        say(Severity::Warning, code, text, crowded, &numbers);
     }
     if back > 0 {
         let text = format!("time steps back {back} times; the log is cut there");
-        say(Severity::Warning, Code::TimeStepsBack, text, back);
+        say(Severity::Warning, Code::TimeStepsBack, text, back, &[]);
     }
     if gaps > 0 {
         let text = format!(
             "{gaps} gaps longer than {GAP} median steps ({:.6} s), the longest {longest:.6} s; the log is cut there",
             interval
         );
-        say(Severity::Note, Code::Gaps, text, gaps);
+        let numbers = [("steps", GAP), ("interval", interval), ("longest", longest)];
+        say(Severity::Note, Code::Gaps, text, gaps, &numbers);
     }
     runs
 }
@@ -453,5 +463,9 @@ pub(crate) fn report_jitter(
             100.0 * JITTER
         ),
         resampled,
-    ));
+    )
+    .with([
+        ("jitter99", typical), ("rate", 1.0 / interval), ("jitter_largest", largest),
+        ("steps_beyond", beyond as f64), ("jitter_limit", JITTER),
+    ]));
 }

@@ -266,7 +266,9 @@ pub(crate) fn less_driven(robot: &Robot, logs: &[(String, Vec<Option<f64>>)]) ->
                 100.0 * torque / largest
             );
             let (severity, code) = (Severity::Note, Code::JointNotDriven);
-            findings.push(Finding::new(severity, code, log, message, 0).of_joint(name));
+            let numbers = [("rms_torque", torque), ("share", torque / largest)];
+            let finding = Finding::new(severity, code, log, message, 0).with(numbers);
+            findings.push(finding.of_joint(name));
         }
     }
     findings

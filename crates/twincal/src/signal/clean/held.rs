@@ -131,6 +131,7 @@ impl Held {
             ),
             self.count,
         )
+        .with([("longest", self.longest), ("seconds", self.time), ("first_at", self.first)])
     }
 }
 

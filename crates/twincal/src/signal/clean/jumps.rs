@@ -252,13 +252,8 @@ fn tell(joints: &[JointFacts], log: &Recording, found: &Found, every_row: bool) 
             facts.name, log.time[largest.0]
         );
         let count = jumps.len() as u64;
-        Some(Finding::new(
-            Severity::Warning,
-            code,
-            &log.name,
-            message,
-            count,
-        ))
+        let finding = Finding::new(Severity::Warning, code, &log.name, message, count);
+        Some(finding.with([("largest", largest.1), ("largest_at", log.time[largest.0])]))
     };
     kinds.into_iter().filter_map(of_kind).collect()
 }

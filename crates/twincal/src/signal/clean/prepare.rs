@@ -140,7 +140,8 @@ pub(crate) fn report_short(log: &Recording, short: u64, rows: u64, findings: &mu
                 _ => format!("{short} segments between cuts ({rows} samples) are shorter than the motion filter and were dropped"),
             },
             rows,
-        ));
+        )
+        .with([("segments", short as f64)]));
     }
 }
 

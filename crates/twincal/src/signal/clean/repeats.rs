@@ -262,7 +262,13 @@ fn on_controllers_clock(rows: &Rows<'_>, ticks: &Ticks, every_row: bool) -> Find
         0 => (Severity::Note, Code::ControllerClock),
         _ => (Severity::Warning, Code::RepeatedSamples),
     };
-    Finding::new(severity, code, &rows.log.name, message, count)
+    Finding::new(severity, code, &rows.log.name, message, count).with([
+        ("rows", all as f64),
+        ("share", count as f64 / all as f64),
+        ("missing", ticks.missing as f64),
+        ("jitter", ticks.jitter),
+        ("interval", ticks.interval),
+    ])
 }
 
 fn held_positions(
@@ -302,13 +308,26 @@ fn held_positions(
         worst.1,
         rows.stamp(first),
     );
-    Finding::new(
+    let finding = Finding::new(
         Severity::Warning,
         Code::RepeatedSamples,
         &rows.log.name,
         message,
         count as u64,
     )
+    .with([
+        ("rows", rows.len() as f64),
+        ("share", count as f64 / rows.len() as f64),
+        ("most_on_a_joint", worst.1 as f64),
+        ("first_at", rows.stamp(first)),
+    ]);
+    match every_row {
+        true => finding,
+        false => finding.with([
+            ("dropped", dropped as f64),
+            ("interpolated", (count - dropped.min(count)) as f64),
+        ]),
+    }
 }
 
 #[cfg(test)]

@@ -53,6 +53,7 @@ pub fn missing_torque(robot: &Robot, log: &Log<'_>) -> Result<Option<Finding>> {
             ),
             most as u64,
         )
+        .with([("rows", samples as f64)])
     }))
 }
 
@@ -93,6 +94,8 @@ pub fn constant_torque<'a>(robot: &Robot, logs: impl Into<Logs<'a>>) -> Result<V
             continue;
         }
         let shown = constant[..constant.len().min(NAMED)].join(", ");
+        let first = moving.iter().find(|(_, torque)| !torque.is_wider(0.0));
+        let first = first.map(|(_, torque)| ("torque", torque.low));
         let cause = "the drives were off, or the column was not recorded";
         let severity = if constant.len() == moving.len() {
             Severity::Degraded
@@ -108,7 +111,8 @@ pub fn constant_torque<'a>(robot: &Robot, logs: impl Into<Logs<'a>>) -> Result<V
                  unless it swung freely; map the measured torque in [columns] tau, or leave this log out"
             ),
             constant.len() as u64,
-        ));
+        )
+        .with(first));
     }
     Ok(findings)
 }

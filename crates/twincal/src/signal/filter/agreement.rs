@@ -54,9 +54,6 @@ pub fn velocity_agreement(trajectory: &Trajectory, standstill: &[f64]) -> Vec<Op
         .collect()
 }
 
-/// Code of the finding on a velocity that is minus the derivative of position.
-const OPPOSITE: Code = Code::VelocityOpposite;
-
 /// A warning for every joint whose velocity does not belong to its position.
 pub(crate) fn findings(names: &[&str], log: &str, agreement: &[Option<Agreement>]) -> Vec<Finding> {
     let wrong = names.iter().zip(agreement);
@@ -69,13 +66,15 @@ pub(crate) fn findings(names: &[&str], log: &str, agreement: &[Option<Agreement>
                     "joint `{name}` of {log}: the logged velocity is the change of position with the opposite sign (slope {slope:.3}): the sign \
                      of one of the two is reversed; give that one the factor -1 in [columns.factor]: q or qd = {{ {name:?} = -1.0 }}"
                 );
-                return Finding::new(Severity::Warning, OPPOSITE, *name, message, 0);
+                return Finding::new(Severity::Warning, Code::VelocityOpposite, *name, message, 0)
+                    .with([("slope", slope)]);
             }
             let message = format!(
                 "joint `{name}`: the logged velocity is not the change of position (R² {r2:.3}, slope {slope:.3}): scaled, \
                  late or of another joint; with [signal] velocity = \"position\" it is not used"
             );
             Finding::new(Severity::Warning, Code::VelocityMismatch, log, message, 0)
+                .with([("r2", r2), ("slope", slope)])
         })
         .collect()
 }

@@ -133,7 +133,8 @@ fn motion_cutoff(
                 pipeline.motion_cutoff_hz
             ),
             0,
-        ));
+        )
+        .with([("cutoff", cutoff), ("cutoff_wanted", pipeline.motion_cutoff_hz), ("rate", rate)]));
     }
     Ok(cutoff)
 }
@@ -186,7 +187,11 @@ fn smooth_segments(
             ready.seconds
         ),
         0,
-    ));
+    )
+    .with([
+        ("border", column_half_seconds(pipeline.cutoff_hz) + pipeline.motion_half_length()),
+        ("seconds_used", used), ("seconds", ready.seconds),
+    ]));
     Ok(segments)
 }
 
@@ -246,7 +251,11 @@ fn report_standstill(
             "joint `{}` {text}; its torque there is not used",
             facts.name
         );
-        let own = Finding::new(severity, code, &log.name, message, still as u64);
+        let own = Finding::new(severity, code, &log.name, message, still as u64).with([
+            ("share_at_rest", still as f64 / all as f64),
+            ("rest_velocity", limit),
+            ("cutoff", pipeline.cutoff_hz),
+        ]);
         findings.push(own.of_joint(&facts.name));
     }
 }

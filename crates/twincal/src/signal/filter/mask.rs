@@ -108,7 +108,11 @@ impl Saturated {
                     100.0 * masked as f64 / all.max(1) as f64
                 ),
                 flat.samples,
-            ));
+            )
+            .with([
+                ("level", flat.level), ("times", flat.spans.len() as f64),
+                ("share_left_out", masked as f64 / all.max(1) as f64),
+            ]));
         }
     }
 }

@@ -106,7 +106,12 @@ impl LongLog {
                     first.without_log()
                 ),
                 rows,
-            ));
+            )
+            .with([
+                ("chapters_left_out", count as f64),
+                ("chapters", chapters as f64),
+                ("first_chapter", (chapter + 1) as f64),
+            ]));
         }
         Ok(())
     }
@@ -126,6 +131,10 @@ impl LongLog {
             ),
             samples as u64,
         )
+        .with([
+            ("chapters", self.chapters() as f64),
+            ("samples_at_most", self.samples.iter().max().copied().unwrap_or(0) as f64),
+        ])
     }
 }
 
@@ -159,11 +168,17 @@ pub(crate) fn told_once(said: Vec<(usize, Finding)>, chapters: usize) -> Vec<Fin
                 1 => "; one more is alike".to_owned(),
                 others => format!("; {others} more are alike"),
             };
-            Some(Finding {
+            let numbers = [
+                ("chapter", (chapter + 1) as f64),
+                ("chapters", chapters as f64),
+                ("chapters_alike", others as f64),
+            ];
+            let told = Finding {
                 message: format!("{} ({place}{more})", worst.message),
                 count,
                 ..worst
-            })
+            };
+            Some(told.with(numbers))
         })
         .collect()
 }

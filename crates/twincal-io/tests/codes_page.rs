@@ -1,0 +1,59 @@
+//! docs/codes.md has every code with its meaning, and with what its findings hold: severities, numbers, remedy and a message.
+
+use std::fmt::Write;
+use std::fs;
+use std::path::Path;
+use twincal::{Code, Severity};
+use twincal_io::words::{When, remedy};
+
+#[test]
+fn the_page_has_every_code_with_what_its_findings_hold() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/codes.md");
+    let page = fs::read_to_string(path).expect("docs/codes.md");
+    let start = page.find("\n### ").expect("the first code");
+    let wanted: String = Code::ALL.iter().map(|code| section(*code)).collect();
+    if page[start..] != wanted {
+        let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join("codes.md");
+        fs::write(&file, page[..start].to_owned() + &wanted).expect("a page");
+        panic!(
+            "docs/codes.md differs: {} is how it has to be",
+            file.display()
+        );
+    }
+}
+
+/// What the page says of a code.
+fn section(code: Code) -> String {
+    let mut text = format!("\n### `{code}`\n{}\n\n", code.meaning());
+    let mut line = |what: &str, words: &str| {
+        let _ = writeln!(text, "- {what}: {words}");
+    };
+    let severities = code.severities().iter().map(|own| match own {
+        Severity::Note => "note",
+        Severity::Warning => "warning",
+        Severity::Degraded => "degraded",
+    });
+    let severities: Vec<&str> = severities.collect();
+    match severities[..] {
+        [] => line("Severity", "only claims have this code"),
+        _ => line("Severity", &severities.join(", ")),
+    }
+    let numbers: Vec<String> = (code.evidence().iter())
+        .map(|name| format!("`{name}`"))
+        .collect();
+    if !numbers.is_empty() {
+        line("Evidence", &numbers.join(", "));
+    }
+    if let Some((_, own)) = remedy(code) {
+        let when = match own.when {
+            When::Now => "Remedy, with these logs",
+            When::NextLog => "Remedy, in the next log",
+            When::Never => "Remedy",
+        };
+        line(when, &own.text.replace('<', "\\<"));
+    }
+    if let Some(example) = code.example() {
+        let _ = write!(text, "\n```text\n{example}\n```\n");
+    }
+    text
+}
