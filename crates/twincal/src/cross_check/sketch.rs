@@ -17,6 +17,10 @@ use std::collections::BTreeMap;
 const CHANGES: u32 = 8;
 /// Patterns of a joint that are kept.
 const MOST: usize = 1024;
+/// Patterns among which those that repeat are counted: 2 % of them are 328 ± 18.
+const COUNTED: usize = 16 * MOST;
+/// Above every hash.
+const ALL_HASHES: u64 = 1 << 53;
 /// Patterns below which a joint is not judged.
 const FEWEST: usize = 16;
 /// Share of the patterns of the median joint from which a log is a copy.
@@ -42,7 +46,7 @@ impl Sketch {
     pub fn of(log: &Log<'_>, joints: usize) -> Result<Self> {
         let rows = Signature::of(log)?.rows;
         let of_joint = |joint: usize| match joint < MOST_JOINTS {
-            true => least(patterns(&rows, joint)),
+            true => least(&patterns(&rows, joint)),
             false => Vec::new(),
         };
         Ok(Self {
@@ -96,17 +100,21 @@ fn patterns(rows: &[Signs], joint: usize) -> Vec<u32> {
 }
 
 /// The smallest hashes of patterns; none where they repeat, as those of ripple or of mains hum over little noise do: another log has as many
-/// of them by chance as the log itself has twice.
-fn least(patterns: Vec<u32>) -> Vec<u64> {
-    let all = patterns.len();
-    let mut hashes: Vec<u64> = patterns.into_iter().map(hash).collect();
+/// of them by chance as the log itself has twice. Hashes below a bound are a random sample of all patterns, and equal ones are in it together:
+/// how many repeat is counted among [`COUNTED`] of them.
+fn least(patterns: &[u32]) -> Vec<u64> {
+    let share = COUNTED as f64 / patterns.len().max(1) as f64;
+    let bound = (share.min(1.0) * ALL_HASHES as f64) as u64;
+    let mut hashes: Vec<u64> = patterns.iter().map(|own| hash(*own)).collect();
+    hashes.retain(|hash| *hash < bound);
+    let all = hashes.len();
     hashes.sort_unstable();
     hashes.dedup();
     if ((all - hashes.len()) as f64) > REPEATED * all as f64 {
         return Vec::new();
     }
     hashes.truncate(MOST);
-    // A log of ten minutes had 600 times as many.
+    // A log of ten minutes had 16 times as many.
     hashes.shrink_to_fit();
     hashes
 }

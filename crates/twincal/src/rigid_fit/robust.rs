@@ -6,7 +6,7 @@
 
 use super::bins::Zone;
 use super::design::{Design, JointRows};
-use crate::linear_algebra::Cholesky;
+use crate::linear_algebra::{Cholesky, product};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -128,25 +128,22 @@ impl Normal {
     }
 }
 
-/// Sums of products of a joint: columns with columns (lower triangle), columns with torque.
+/// Sums of products of a joint: columns with columns (lower triangle), columns with torque. Rows without weight are left out, whatever their
+/// numbers are.
 fn sums(rows: &JointRows, weights: &[f64], torque: &dyn Fn(usize) -> f64) -> (Vec<f64>, Vec<f64>) {
     let width = rows.columns.len();
-    let (mut matrix, mut right) = (vec![0.0; width * width], vec![0.0; width]);
-    for (row, &weight) in weights.iter().enumerate() {
-        if weight == 0.0 {
-            continue;
-        }
-        let (x, y) = (rows.row(row), torque(row));
-        for (a, &xa) in x.iter().enumerate() {
-            let scaled = weight * xa;
-            right[a] += scaled * y;
-            let own = &mut matrix[a * width..a * width + a + 1];
-            own.iter_mut()
-                .zip(x)
-                .for_each(|(sum, xb)| *sum += scaled * xb);
-        }
+    let weighed = || (weights.iter().enumerate()).filter(|(_, weight)| **weight != 0.0);
+    let count = weighed().count();
+    let (mut columns, mut scaled) = (Vec::with_capacity(count * width), vec![0.0; count * width]);
+    let mut y = Vec::with_capacity(count);
+    for (at, (row, weight)) in weighed().enumerate() {
+        let x = rows.row(row);
+        columns.extend_from_slice(x);
+        (x.iter().enumerate()).for_each(|(a, x)| scaled[a * count + at] = weight * x);
+        y.push(torque(row));
     }
-    (matrix, right)
+    let matrix = product(&scaled, &columns, [width, count, width]);
+    (matrix, product(&scaled, &y, [width, count, 1]))
 }
 
 /// The fit of these rows that most of them agree on; `None` where nothing can be fitted.

@@ -19,7 +19,7 @@ const COUNTS: f64 = 4.0;
 const DEVIATIONS: f64 = 10.0;
 /// Changes below this share of the largest position are rounding.
 const ROUNDING: f64 = 1e-7;
-/// Third differences that the noise is estimated from, about.
+/// Values that the size of a channel, and third differences that its noise, are estimated from, about.
 const SAMPLED: usize = 1 << 16;
 /// Variance of a standard normal variable below its median modulus.
 const LOWER_HALF: f64 = 0.142_6;
@@ -249,7 +249,8 @@ pub(super) fn count(values: &[f64]) -> f64 {
 
 /// The smallest of these changes of a channel that is no rounding; infinite without one.
 fn least_change(values: &[f64], changes: impl Iterator<Item = f64>) -> f64 {
-    let rounding = ROUNDING * usual_size(values.iter());
+    let stride = values.len().div_ceil(SAMPLED).max(1);
+    let rounding = ROUNDING * usual_size(values.iter().step_by(stride));
     changes
         .map(f64::abs)
         .filter(|change| *change > rounding)
