@@ -10,16 +10,21 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 
 thread_local! {
-    /// True once the program that called the command of this thread gave it up.
+    /// True once the caller of the work on this thread gave it up; none where it cannot.
     static GIVEN_UP: RefCell<Option<Arc<AtomicBool>>> = const { RefCell::new(None) };
 }
 
-/// Runs a command on this thread for a program that may give it up.
-pub(crate) fn unless<T>(given_up: &Arc<AtomicBool>, command: impl FnOnce() -> T) -> T {
-    let before = GIVEN_UP.replace(Some(Arc::clone(given_up)));
-    let result = command();
-    GIVEN_UP.set(before);
-    result
+/// Runs work on this thread for a caller that may give it up, or for one that does not. A thread that waits may do the work of another caller
+/// meanwhile: that work has its own token, and the token of this one is there again afterwards, also behind a panic.
+pub(crate) fn called<T>(given_up: Option<Arc<AtomicBool>>, work: impl FnOnce() -> T) -> T {
+    struct Before(Option<Arc<AtomicBool>>);
+    impl Drop for Before {
+        fn drop(&mut self) {
+            GIVEN_UP.set(self.0.take());
+        }
+    }
+    let _before = Before(GIVEN_UP.replace(given_up));
+    work()
 }
 
 /// The program that called the command of a thread, if one did.

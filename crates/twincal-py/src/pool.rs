@@ -57,7 +57,8 @@ pub(crate) fn work<T: Send, E: Send + Into<Problem>>(
     work: impl FnOnce() -> Result<T, E> + Send,
 ) -> Result<T, Problem> {
     let pool = threads(wanted)?;
-    match catch_unwind(AssertUnwindSafe(|| pool.install(work))) {
+    let apart = || twincal_cli::session::apart(work);
+    match catch_unwind(AssertUnwindSafe(|| pool.install(apart))) {
         Ok(result) => result.map_err(Into::into),
         Err(panic) => Err(Problem::Panicked(words(&*panic))),
     }

@@ -7,7 +7,7 @@ use crate::robot::{numbers, owned};
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use std::sync::Arc;
-use twincal::infer::{InferenceSettings, bytes_of_chains};
+use twincal::infer::{Choice, EXACT_LIMIT, InferenceSettings};
 use twincal::likelihood::NoiseModel;
 use twincal::posterior::draws::draw;
 use twincal::posterior::summary::{ColumnSummary, summarise};
@@ -104,9 +104,16 @@ impl Asked {
         };
         let mut inference = config.settings()?.calibration.inference;
         inference.allow_disagreement = true;
-        let components = self.groups.iter().max().map_or(0, |last| last + 1);
-        let needed = bytes_of_chains(components, self.groups.len(), &inference);
-        twincal_io::memory::require("draws of all chains", needed, "use fewer draws or chains")?;
+        let samples = match inference.method {
+            Choice::Auto => self.groups.iter().max() >= Some(&EXACT_LIMIT),
+            Choice::Exact => false,
+            Choice::Gibbs => true,
+        };
+        if samples {
+            // a chain also keeps two numbers per draw to be compared by
+            let numbers = [inference.chains, inference.draws, self.groups.len() + 2];
+            pool::require_memory("draws of all chains", &numbers)?;
+        }
         Ok(inference)
     }
 }

@@ -57,7 +57,13 @@ pub(super) fn run(flags: &Check, terminal: &mut Terminal) -> Outcome<u8> {
     let progress = Progress::new();
     progress.step(&format!("reading {}", flags.twin.to_string_lossy()));
     let stored = StoredTwin::read(&Artifact::open(&flags.twin)?, false)?;
-    if stored.calibration.validation.split == Split::NotTested {
+    let validation = &stored.calibration.validation;
+    let no_rows = validation
+        .filtered
+        .joints
+        .iter()
+        .all(|joint| joint.rows == 0);
+    if validation.split == Split::NotTested || no_rows {
         return Err(Failure::usage(
             "the twin was never tested: it has no error that new ones could be compared with",
             "fit again with --heldout LOG",

@@ -421,11 +421,15 @@ fn print_promises(found: &Design, loaded: bool, terminal: &mut Terminal) {
     }
     let mut rows = table(&["effect", "PIP now", "decided rightly", "wrongly", "sd then"]);
     for promise in &found.promises {
+        let decided = |share: f64| match promise.structural {
+            true => "–".to_owned(),
+            false => words::share(share),
+        };
         rows.add_row([
             promise.effect.clone(),
             words::chance(promise.pip),
-            words::share(promise.right),
-            words::share(promise.wrong),
+            decided(promise.right),
+            decided(promise.wrong),
             promise.sd.map_or_else(|| "–".into(), |sd| number(sd, 2)),
         ]);
     }

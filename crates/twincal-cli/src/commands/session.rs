@@ -367,6 +367,11 @@ pub fn merged(sum: &StatisticsFile, other: &StatisticsFile) -> Outcome<Statistic
     Ok(sum)
 }
 
+/// Runs work of a caller of its own: whatever else threads that are shared have to do meanwhile, it is not given up with that.
+pub fn apart<T>(work: impl FnOnce() -> T) -> T {
+    interrupts::called(None, work)
+}
+
 /// Runs a command of the program with these arguments, without its name, and returns exit code and what it would have
 /// printed on standard output. It uses the threads of the pool that it is called in. Once `given_up` is true the command ends at
 /// its next log or stage and writes nothing.
@@ -382,7 +387,7 @@ pub fn call(
         Failure::usage(error.to_string(), "see `twincal help` for the arguments")
     })?;
     let mut terminal = Terminal::kept();
-    let code = interrupts::unless(given_up, || {
+    let code = interrupts::called(Some(Arc::clone(given_up)), || {
         silently(|| run(&arguments.command, &mut terminal))
     })?;
     Ok((code, terminal.into_kept()))

@@ -9,6 +9,7 @@ use super::{
 use crate::args::StatisticsFlags;
 use crate::exit;
 use crate::failure::{Failure, Outcome};
+use crate::interrupts::require_caller;
 use crate::names::display_names;
 use crate::progress::Progress;
 use crate::terminal::Terminal;
@@ -223,11 +224,13 @@ impl Road<'_> {
             Some(file) => file.write_all(text.as_bytes()),
             None => Ok(()),
         };
+        require_caller()?;
         Ok(output.commit(written)?)
     }
 
     /// Makes the file of a log, if it is not there.
     fn log(&mut self, plan: &Plan, (path, name): (&Path, &str)) -> Outcome<Entry> {
+        require_caller()?;
         let target = self.flags.output.join(file_name(name));
         let entry = |made| Entry {
             log: name.to_owned(),

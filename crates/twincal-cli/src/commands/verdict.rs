@@ -17,7 +17,8 @@ pub(super) fn doubt(calibration: &Calibration) -> Option<Finding> {
 
 /// "Can this twin be used? No: … Joint elbow: …"
 fn words(answer: &Answer) -> String {
-    let mut reasons = answer.limits.iter().chain(&answer.next);
+    let next = answer.next.as_ref().map(|next| format!("Record {next}"));
+    let mut reasons = answer.limits.iter().chain(&next);
     let reason = reasons.next().or(answer.grounds.first());
     let reason = reason.map_or("", String::as_str);
     let more = match answer.limits.len() + answer.folded.len() {
@@ -33,22 +34,27 @@ mod tests {
 
     #[test]
     fn the_first_reason_stands_behind_the_answer() {
-        let told = |lead: &str, limits: &[&str]| {
-            words(&Answer {
-                answer: assess::Answer::NotYet,
-                reason: Code::NothingEstablished,
-                headline: String::new(),
-                lead: lead.into(),
-                grounds: vec!["Torque error: 1 → 2 N·m.".into()],
-                limits: limits.iter().map(|&limit| limit.into()).collect(),
-                folded: Vec::new(),
-                next: None,
-            })
+        let of = |lead: &str, limits: &[&str]| Answer {
+            answer: assess::Answer::NotYet,
+            reason: Code::NothingEstablished,
+            headline: String::new(),
+            lead: lead.into(),
+            grounds: vec!["Torque error: 1 → 2 N·m.".into()],
+            limits: limits.iter().map(|&limit| limit.into()).collect(),
+            folded: Vec::new(),
+            next: None,
         };
+        let told = |lead: &str, limits: &[&str]| words(&of(lead, limits));
         assert_eq!(
             told("No: worse.", &[]),
             "can this twin be used? No: worse. Torque error: 1 → 2 N·m."
         );
+        let not_tested = Answer {
+            next: Some("another motion.".into()),
+            ..of("Not yet: not tested.", &[])
+        };
+        let said = "can this twin be used? Not yet: not tested. Record another motion.";
+        assert_eq!(words(&not_tested), said);
         assert_eq!(
             told(
                 "Yes, to predict torque, with the exceptions:",

@@ -78,11 +78,16 @@ fn numbers(design: &Design, about: &About<'_>) -> Vec<Number> {
 }
 
 fn question(own: &Promise) -> Question {
+    // Where no motion distinguishes it from others there is nothing to decide.
+    let decided = |share: f64| match own.structural {
+        true => "–".to_owned(),
+        false => words::share(share),
+    };
     Question {
         effect: own.effect.clone(),
         pip: words::chance(own.pip),
-        right: words::share(own.right),
-        wrong: words::share(own.wrong),
+        right: decided(own.right),
+        wrong: decided(own.wrong),
         sd: own.sd.map_or_else(|| "–".into(), |sd| number(sd, 2)),
         structural: own.structural,
     }

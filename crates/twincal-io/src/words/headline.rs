@@ -21,6 +21,9 @@ pub(super) fn headline(
     exceptions: Exceptions,
 ) -> String {
     let reason = assessment.reason;
+    if reason == Code::TorqueCopied {
+        return "Not yet: the torque of one joint is that of another.".into();
+    }
     if let Some(mistake) = Mistake::of(reason, Severity::Degraded) {
         return mistake_words(mistake).into();
     }

@@ -12,7 +12,7 @@ pub(crate) fn remarks(component: &ComponentSummary, calibration: &Calibration) -
     let first = component.parameters.first().map(ParameterSummary::told);
     let negative = first.and_then(|(value, spread)| component.family.remark(value, spread));
     let explained = explanations(component, calibration);
-    let explained = explained.iter().map(explanation);
+    let explained = explained.iter().filter_map(explanation);
     negative
         .map(str::to_owned)
         .into_iter()
@@ -20,22 +20,22 @@ pub(crate) fn remarks(component: &ComponentSummary, calibration: &Calibration) -
         .collect()
 }
 
-fn explanation(own: &Explanation) -> String {
-    match own {
+fn explanation(own: &Explanation) -> Option<String> {
+    Some(match own {
         Explanation::Tensor(elements) => {
             let elements = elements.iter().take(ELEMENTS).map(element);
             format!("in your model {}", elements.collect::<Vec<_>>().join(", "))
         }
         Explanation::AllFriction => "all of it: what your model file states is not counted".into(),
         Explanation::TensorOfLink(link) => {
-            format!("has in it the tensor that {link} lacks in your model")
+            format!("has in it the tensor of {link} that is missing in your model")
         }
         Explanation::SizeOfGravity(size) => format!(
             "gravity would be {} m/s²: it makes up for wrong masses, springs or a wrong scale of torque",
             number(*size, 3)
         ),
-        _ => String::new(),
-    }
+        _ => return None,
+    })
 }
 
 /// "izz 0.02 → 0.03 (+50.0 %)".
@@ -102,7 +102,7 @@ mod tests {
             (remarks(&own, &calibration), child)
         };
         let (told, child) = of(Family::MotorInertia);
-        let said = format!("has in it the tensor that {child} lacks in your model");
+        let said = format!("has in it the tensor of {child} that is missing in your model");
         assert_eq!(told, [said]);
         assert_eq!(of(Family::Spring).0, [""; 0]);
     }

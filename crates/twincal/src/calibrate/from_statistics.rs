@@ -204,8 +204,12 @@ fn estimated(
     let mut fitted = fitted::estimate(sums, &[], columns, settings)?;
     findings.extend(independent_rows::require(robot, &fitted.fit, &[])?.findings);
     let fit = &fitted.fit;
-    settings.require_room_for_draws(&fit.problem)?;
-    fitted.fit.posterior = infer_near(&fit.problem, &fit.posterior, &settings.inference)?;
+    fitted.fit.posterior = infer_near(
+        &fit.problem,
+        &fit.posterior,
+        &settings.inference,
+        settings.most_bytes,
+    )?;
     findings.extend(unsettled::findings(robot, &fitted, settings, sums));
     findings.extend(misfit::findings(robot, &fitted.fit.plug_in));
     Ok(fitted)

@@ -1,9 +1,7 @@
 //! What a calibration can be told.
 
-use crate::error::{Error, Result};
-use crate::infer::{Choice, InferenceSettings, bytes_of_chains};
+use crate::infer::{Choice, InferenceSettings};
 use crate::likelihood::{NoiseModel, NoiseSettings};
-use crate::posterior::Problem;
 use crate::prior::PriorSettings;
 use crate::signal::{Auto, Corrections, SignalSettings};
 use crate::term::{Family, LibrarySettings};
@@ -44,34 +42,6 @@ pub struct CalibrationSettings {
     pub relinearise: usize,
     /// Bytes that are free for what is made of the recordings (no key of `twincal.toml`); `None`: any number.
     pub most_bytes: Option<u64>,
-}
-
-impl CalibrationSettings {
-    /// Refuses chains whose draws the memory does not hold: a failed allocation would end the process.
-    ///
-    /// # Errors
-    /// [`Error::Setting`] with both numbers.
-    pub(super) fn require_room_for_draws(&self, problem: &Problem) -> Result<()> {
-        let Some(most) = self.most_bytes else {
-            return Ok(());
-        };
-        let (components, columns) = (problem.prior.components(), problem.names.len());
-        let needed = bytes_of_chains(components, columns, &self.inference);
-        if needed <= most {
-            return Ok(());
-        }
-        Err(Error::Setting {
-            key: "inference.draws".into(),
-            problem: format!(
-                "{} draws of {} chains need up to {:.1} MB of memory, and {:.1} MB are free",
-                self.inference.draws,
-                self.inference.chains,
-                1e-6 * needed as f64,
-                1e-6 * most as f64
-            ),
-            remedy: "use fewer draws or chains".into(),
-        })
-    }
 }
 
 impl Default for CalibrationSettings {

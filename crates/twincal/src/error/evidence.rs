@@ -47,9 +47,11 @@ impl Evidence {
 
 impl Extend<(&'static str, f64)> for Evidence {
     fn extend<T: IntoIterator<Item = (&'static str, f64)>>(&mut self, numbers: T) {
+        // JSON has no infinity.
+        let known = |number: f64| if number.is_finite() { number } else { f64::NAN };
         let numbers = numbers.into_iter();
         self.0
-            .extend(numbers.map(|(name, number)| (Cow::Borrowed(name), number)));
+            .extend(numbers.map(|(name, number)| (Cow::Borrowed(name), known(number))));
     }
 }
 

@@ -61,23 +61,6 @@ pub struct InferenceSettings {
     pub allow_disagreement: bool,
 }
 
-/// Bytes that the draws of all chains take, of a problem with so many components and columns; 0 where all models are summed.
-///
-/// A chain keeps two numbers of each component and one of each column per draw, and the longest run so far stands beside the next one.
-#[must_use]
-pub fn bytes_of_chains(components: usize, columns: usize, settings: &InferenceSettings) -> u64 {
-    let sums = settings.method == Choice::Exact
-        || settings.method == Choice::Auto && components <= EXACT_LIMIT;
-    if sums {
-        return 0;
-    }
-    let numbers = [settings.chains, settings.draws, 2 * components + columns];
-    let bytes = 2 * size_of::<f64>() as u64;
-    numbers
-        .iter()
-        .fold(bytes, |all, &own| all.saturating_mul(own as u64))
-}
-
 /// The posterior of `problem` by the chosen method.
 ///
 /// # Errors
@@ -105,20 +88,22 @@ pub fn bytes_of_chains(components: usize, columns: usize, settings: &InferenceSe
 /// # Ok::<(), twincal::Error>(())
 /// ```
 pub fn infer(problem: &Problem, settings: &InferenceSettings) -> Result<Posterior> {
-    checked(problem, by_method(problem, None, settings)?)
+    checked(problem, by_method(problem, None, settings, None)?)
 }
 
 /// [`infer`] where an approximate posterior of the same problem is known: with very many columns a good model to start from is half of the work.
+/// Chains whose draws need more than `most_bytes` are refused before they are allocated: where that fails the process ends.
 ///
 /// # Errors
-/// Those of [`infer`].
+/// Those of [`infer`], and [`crate::Error::Setting`] for too many draws.
 pub fn infer_near(
     problem: &Problem,
     near: &Posterior,
     settings: &InferenceSettings,
+    most_bytes: Option<u64>,
 ) -> Result<Posterior> {
     let near = Some(near).filter(|_| problem.names.len() > MANY_COLUMNS);
-    checked(problem, by_method(problem, near, settings)?)
+    checked(problem, by_method(problem, near, settings, most_bytes)?)
 }
 
 fn checked(problem: &Problem, posterior: Posterior) -> Result<Posterior> {
@@ -140,9 +125,10 @@ fn by_method(
     problem: &Problem,
     near: Option<&Posterior>,
     settings: &InferenceSettings,
+    most_bytes: Option<u64>,
 ) -> Result<Posterior> {
     if settings.method == Choice::Gibbs {
-        return gibbs::sample(problem, near, settings);
+        return gibbs::sample(problem, near, settings, most_bytes);
     }
     let certain = certain::components(&Standard::new(problem)?, problem, near);
     let open = certain.sure.iter().filter(|c| !**c).count();
@@ -155,7 +141,7 @@ fn by_method(
                 "use `auto` or `gibbs`, or at most {EXACT_LIMIT} components that the data leave open"
             ),
         }),
-        Choice::Auto | Choice::Gibbs => gibbs::sample(problem, near, settings),
+        Choice::Auto | Choice::Gibbs => gibbs::sample(problem, near, settings, most_bytes),
     }
 }
 

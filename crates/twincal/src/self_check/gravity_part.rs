@@ -5,7 +5,7 @@
 //! 1.5 where every link's mass is 30 % wrong besides.
 
 use super::columns::is_constant;
-use super::parts::{Torques, driven, payload};
+use super::parts::{DRIVEN, Torques, driven, payload};
 use super::sample::Sample;
 use super::shared::{self, CLEARLY, Estimate};
 use crate::error::{Code, Finding, Severity};
@@ -56,9 +56,11 @@ impl Factors {
     /// Fits them on a sample. `gravity` is that of the robot's own model at this sample's motion.
     pub(super) fn of(robot: &Robot, sample: &Sample, parts: &super::parts::Parts) -> Option<Self> {
         let gravity = parts.gravity(robot.description().gravity);
-        let driven: Vec<bool> = (driven(sample, parts, &gravity).into_iter().enumerate())
-            .map(|(joint, size)| size.is_some() && !is_constant(sample, joint))
-            .collect();
+        let driven: Vec<bool> = (driven(sample, parts, &gravity, DRIVEN)
+            .into_iter()
+            .enumerate())
+        .map(|(joint, size)| size.is_some() && !is_constant(sample, joint))
+        .collect();
         let carried = payload(robot, sample);
         let nominal: [&Torques; 2] = [&gravity, &parts.inertia];
         let with: Vec<&Torques> = nominal

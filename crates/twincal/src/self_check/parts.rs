@@ -8,7 +8,7 @@ const POINT: (f64, f64) = (1.0, 0.1);
 /// Fewest samples in motion that say anything.
 const FEWEST: usize = 40;
 /// Share of gravity's and inertia's power that is left in their sum where a joint is driven: of one that swings freely they cancel.
-const DRIVEN: f64 = 0.25;
+pub(super) const DRIVEN: f64 = 0.25;
 /// Least nominal torque of a joint, as a share of the largest of all joints, that says whether it is driven.
 const SAYS: f64 = 1e-3;
 /// Unit gravity along x, y and z of the base.
@@ -80,8 +80,14 @@ pub(super) fn payload(robot: &Robot, sample: &Sample) -> Vec<[Torques; 2]> {
         .collect()
 }
 
-/// Standard deviation of the torque that each joint's motion needs by the model; `None` for joints that hardly move, or swing freely.
-pub(super) fn driven(sample: &Sample, parts: &Parts, gravity: &Torques) -> Vec<Option<f64>> {
+/// Standard deviation of the torque that each joint's motion needs by the model; `None` for joints that hardly move, or swing freely: less
+/// than this `share` of the variances of gravity and inertia is left of their sum.
+pub(super) fn driven(
+    sample: &Sample,
+    parts: &Parts,
+    gravity: &Torques,
+    share: f64,
+) -> Vec<Option<f64>> {
     let sizes: Vec<[f64; 2]> = (0..gravity.len())
         .map(|joint| {
             let rows: Vec<usize> = (0..sample.len)
@@ -97,7 +103,7 @@ pub(super) fn driven(sample: &Sample, parts: &Parts, gravity: &Torques) -> Vec<O
         })
         .collect();
     let largest = sizes.iter().fold(0.0_f64, |most, [sum, _]| most.max(*sum));
-    let is_driven = |[sum, parts]: [f64; 2]| sum > DRIVEN * parts && sum > SAYS * SAYS * largest;
+    let is_driven = |[sum, parts]: [f64; 2]| sum > share * parts && sum > SAYS * SAYS * largest;
     let sizes = sizes.into_iter();
     sizes
         .map(|size| is_driven(size).then(|| size[0].sqrt()))

@@ -56,8 +56,12 @@ pub(in crate::calibrate) fn estimate<'d>(
     }
     findings.extend(seen.iter().map(Seen::told));
     let fit = &fitted.fit;
-    settings.require_room_for_draws(&fit.problem)?;
-    let inferred = infer_near(&fit.problem, &fit.posterior, &settings.inference);
+    let inferred = infer_near(
+        &fit.problem,
+        &fit.posterior,
+        &settings.inference,
+        settings.most_bytes,
+    );
     fitted.fit.posterior = inferred.map_err(|error| match error {
         Error::Refused { .. } => Exit::Disagreeing(error),
         other => Exit::Failed(other),

@@ -92,6 +92,14 @@ struct Run<'a> {
     length: Length,
 }
 
+/// Bytes that the draws of one chain take: `conditional`, `jumped` and `beta` of its [`Trace`].
+pub(super) fn bytes(reduced: &Reduced<'_>, draws: usize) -> u64 {
+    let numbers = 2 * reduced.open.blocks.len() + reduced.full.size();
+    (size_of::<f32>() as u64)
+        .saturating_mul(numbers as u64)
+        .saturating_mul(draws as u64)
+}
+
 impl WithSimd for Run<'_> {
     type Output = Trace;
 

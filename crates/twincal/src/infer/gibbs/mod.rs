@@ -100,11 +100,13 @@ pub(super) fn sample(
     problem: &Problem,
     near: Option<&Posterior>,
     settings: &InferenceSettings,
+    most_bytes: Option<u64>,
 ) -> Result<Posterior> {
     require_draws(settings)?;
     let standard = Standard::new(problem)?;
     let certain = certain::components(&standard, problem, near);
     let reduced = Reduced::new(&standard, &certain);
+    require_room(&reduced, settings, most_bytes)?;
     let jumps = Jumps::of(&reduced, problem, near);
     chains(problem, settings, &reduced, jumps, true)
 }
@@ -129,6 +131,33 @@ pub(super) fn require_draws(settings: &InferenceSettings) -> Result<()> {
             "use at least {LEAST_CHAINS} chains (better 4) and {LEAST_DRAWS} draws (better 5000)"
         ),
     })
+}
+
+/// Refuses chains whose draws need more than `most` bytes; the longest run so far stands beside the next one.
+///
+/// # Errors
+/// [`Error::Setting`] with both numbers.
+fn require_room(
+    reduced: &Reduced<'_>,
+    settings: &InferenceSettings,
+    most: Option<u64>,
+) -> Result<()> {
+    let of_chain = chain::bytes(reduced, settings.draws);
+    let needed = of_chain.saturating_mul(2 * settings.chains as u64);
+    match most {
+        Some(most) if needed > most => Err(Error::Setting {
+            key: "inference.draws".into(),
+            problem: format!(
+                "{} draws of {} chains need up to {:.1} MB of memory, and {:.1} MB are free",
+                settings.draws,
+                settings.chains,
+                1e-6 * needed as f64,
+                1e-6 * most as f64
+            ),
+            remedy: "use fewer draws or chains".into(),
+        }),
+        _ => Ok(()),
+    }
 }
 
 /// [`sample`] with a given list of models to jump between; with `share`, chains that are run again know what all of them

@@ -8,6 +8,8 @@ use rayon::prelude::*;
 
 /// Degrees per radian.
 const DEGREES: f64 = 180.0 / std::f64::consts::PI;
+/// Radians per degree.
+const RADIANS: f64 = std::f64::consts::PI / 180.0;
 /// How near a ratio of velocities must be to that.
 const NEAR: f64 = 0.1;
 /// Share of the velocity's power that the differences of position must explain.
@@ -35,12 +37,18 @@ pub(crate) fn refuse_degrees(joints: &[JointFacts], log: &Recording) -> Result<(
 
 /// The same for one joint.
 fn refuse_joint(facts: &JointFacts, channels: &Channels, log: &Recording) -> Result<()> {
-    let error = |problem: String, remedy: &str, channels: &str| {
+    let error = |problem: String, remedy: &str, channels: &[&str]| {
+        let channels: Vec<String> = (channels.iter())
+            .map(|channel| format!("{channel} = {{ {:?} = {RADIANS} }}", facts.name))
+            .collect();
         Err(Error::Unit {
             log: log.name.clone(),
             unit: WrongUnit::Degrees(facts.name.clone()),
             problem,
-            remedy: format!("{remedy}: × π/180, as with [columns] factor = {{ {channels} }}"),
+            remedy: format!(
+                "{remedy}: × π/180, as with [columns] factor = {{ {} }} for this joint alone; `twincal init` finds all that need it",
+                channels.join(", ")
+            ),
         })
     };
     if facts.kind == JointKind::Prismatic {
@@ -55,7 +63,7 @@ fn refuse_joint(facts: &JointFacts, channels: &Channels, log: &Recording) -> Res
                     facts.name
                 ),
                 "export velocities in rad/s",
-                "qd = 0.017453292519943295",
+                &["qd"],
             );
         }
         if near(1.0 / DEGREES) {
@@ -66,7 +74,7 @@ fn refuse_joint(facts: &JointFacts, channels: &Channels, log: &Recording) -> Res
                     1.0 / ratio
                 ),
                 "export positions in rad",
-                "q = 0.017453292519943295",
+                &["q"],
             );
         }
     }
@@ -82,7 +90,7 @@ fn refuse_joint(facts: &JointFacts, channels: &Channels, log: &Recording) -> Res
                 facts.name
             ),
             "export positions, velocities and accelerations in radians",
-            "q = 0.017453292519943295, qd = 0.017453292519943295",
+            &["q", "qd"],
         );
     }
     Ok(())

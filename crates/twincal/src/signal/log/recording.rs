@@ -235,6 +235,24 @@ pub trait NextChannel: Sized {
     /// # Errors
     /// That of an earlier channel, or of this one.
     fn acceleration(self, qdd: impl Into<Vec<f64>>) -> Result<Recording>;
+
+    /// [`Recording::temperature`].
+    ///
+    /// # Errors
+    /// That of an earlier channel, or of this one.
+    fn temperature(self, temperature: impl Into<Vec<f64>>) -> Result<Recording>;
+
+    /// [`Recording::joint_without_torque`].
+    ///
+    /// # Errors
+    /// That of an earlier channel, or of this one.
+    fn joint_without_torque(self, q: impl Into<Vec<f64>>) -> Result<Recording>;
+
+    /// [`Recording::carrying`].
+    ///
+    /// # Errors
+    /// That of an earlier channel.
+    fn carrying(self, payload: Payload) -> Result<Recording>;
 }
 
 impl NextChannel for Result<Recording> {
@@ -248,6 +266,18 @@ impl NextChannel for Result<Recording> {
 
     fn acceleration(self, qdd: impl Into<Vec<f64>>) -> Result<Recording> {
         self?.acceleration(qdd)
+    }
+
+    fn temperature(self, temperature: impl Into<Vec<f64>>) -> Result<Recording> {
+        self?.temperature(temperature)
+    }
+
+    fn joint_without_torque(self, q: impl Into<Vec<f64>>) -> Result<Recording> {
+        self?.joint_without_torque(q)
+    }
+
+    fn carrying(self, payload: Payload) -> Result<Recording> {
+        Ok(self?.carrying(payload))
     }
 }
 
