@@ -2,6 +2,7 @@
 
 import html
 import json
+import math
 import re
 
 import pytest
@@ -66,3 +67,42 @@ def test_a_check_of_what_was_fitted_has_the_exit_code_of_its_answer(made):
     usable = checked["assessment"]["answer"] in USABLE
     expected = 1 if checked["assessment"]["answer"] == "no" else 0 if usable and not lost else 3
     assert done.returncode == expected, checked["assessment"]
+
+
+# Numbers that stand behind a message and not in it, or as "> 0.999".
+BESIDE = {
+    ("standstill", "cutoff"),
+    ("standstill", "rest_velocity"),
+    ("copied_log", "first_row"),
+    ("copied_log", "first_row_of_original"),
+    ("alike_in_data", "pip"),
+}
+FACTORS = (1.0, 100.0, 1e3, 1e6, 1e-3, 180 / math.pi, 1e9)
+NUMBER = re.compile(r"[-+−]?[\d.]+(?:e[-+]?\d+)?")
+
+
+def printed(number, message):
+    """Whether a message prints a number, in SI units, percent, thousandths or degrees, to its own digits."""
+    for text in NUMBER.findall(message.replace("\u2212", "-").replace("\u202f", "")):
+        try:
+            said = float(text)
+        except ValueError:
+            continue
+        digits = text.lower().split("e")[0].lstrip("+-")
+        exponent = int(text.lower().split("e")[1]) if "e" in text.lower() else 0
+        unit = 10.0 ** (exponent - len(digits.partition(".")[2]))
+        if any(abs(abs(said) - abs(factor * number)) <= 0.51 * unit for factor in FACTORS):
+            return True
+    return False
+
+
+def test_the_numbers_of_a_finding_stand_in_its_message(made):
+    """Evidence and message are made apart: a number of one that is not in the other is a wrong one."""
+    _, _, _, result = made
+    lost = []
+    for finding in result["findings"]:
+        for name, number in finding.get("evidence", {}).items():
+            beside = number is None or (finding["code"], name) in BESIDE
+            if not beside and not printed(number, finding["message"]):
+                lost.append((finding["code"], name, number, finding["message"]))
+    assert not lost, lost

@@ -148,6 +148,35 @@ fn a_check_of_a_log_with_a_mistake_is_inconclusive() {
     assert_eq!(answer, "not_yet");
 }
 
+/// Torque columns that measure nothing are no change of the robot, whatever the gates say of them.
+#[test]
+fn a_check_of_a_log_without_a_measurement_is_inconclusive() {
+    let folder = folder();
+    fs::write(folder.path().join("run.csv"), csv(2000, &|_, row| row)).unwrap();
+    fit(folder.path(), &["-o", "out"]);
+    let dead = csv(2000, &|_, mut row| {
+        row[7] = "0".into();
+        row
+    });
+    let copied = csv(2000, &|_, mut row| {
+        row[7] = row[8].clone();
+        row
+    });
+    for (name, text, code) in [
+        ("dead.csv", dead, "torque_constant"),
+        ("copied.csv", copied, "torque_copied"),
+    ] {
+        fs::write(folder.path().join(name), text).unwrap();
+        assert_eq!(verdict_is_the_answer(folder.path(), name), "not_yet");
+        let json = run(folder.path(), ["check", name, "--twin", "out", "--json"]);
+        let told: Value = serde_json::from_str(&json.out).unwrap();
+        assert_eq!(told["assessment"]["reason"], code, "{told}");
+        assert_eq!(json.code, Some(3));
+    }
+    let done = fit(folder.path(), &["-o", "again", "dead.csv"]);
+    assert!(done.out.starts_with("Not yet"), "{}", done.out);
+}
+
 #[test]
 fn a_good_twin() {
     let folder = folder();

@@ -147,6 +147,37 @@ def test_ctrl_c_ends_a_call_within_a_second(arm, call):
     assert float(done.stdout) < 1.0, done.stderr
 
 
+APART = """
+import pathlib, signal, sys, tempfile, threading
+import os
+import twincal
+signal.signal(signal.SIGINT, signal.default_int_handler)
+robot = twincal.Robot.from_urdf(sys.argv[1])
+log = twincal.Log.read(sys.argv[2])
+folder = pathlib.Path(tempfile.mkdtemp())
+(folder / "limits.toml").write_text(
+    "".join(f'[joint."{name}"]\\nvelocity = 0.9\\ntorque = 1000\\n' for name in robot.joint_names)
+)
+ended = 0
+for number in range(10):
+    threading.Timer(0.2, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
+    try:
+        twincal.design(folder / str(number), model=sys.argv[1], limits=folder / "limits.toml", duration=120)
+    except KeyboardInterrupt:
+        pass
+    twincal.fit(robot, log, families=["payload", "viscous", "coulomb"], generic=False)
+    ended += 1
+print(ended, flush=True)
+os._exit(0)
+"""
+
+
+def test_a_call_that_was_given_up_ends_no_other(arm):
+    """A fit at once after a search that was interrupted and still runs on the same threads, ten times."""
+    done = python(APART, arm.model, arm.folder / "run1.csv")
+    assert done.stdout.strip() == "10", done.stderr
+
+
 def test_progress_is_called_and_may_stop(arm, robot):
     heard = []
     twincal.fit(robot, arm.log("run1"), progress=lambda *own: heard.append(own), **SETTINGS)

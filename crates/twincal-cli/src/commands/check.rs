@@ -17,6 +17,8 @@ use serde::Serialize;
 use twincal::Code;
 use twincal::assess::{Answer, Assessment, Claim, of_gates};
 use twincal::calibrate::Calibration;
+use twincal::self_check::self_check;
+use twincal::signal::Trajectory;
 use twincal::twin::Twin;
 use twincal::validate::{
     Change, Changes, FALSE_ALARM, HeldOut, Scores, Split, Validation, least_share,
@@ -137,11 +139,12 @@ pub(super) fn run(flags: &Check, terminal: &mut Terminal) -> Outcome<u8> {
 
 /// What the verdict rests on: gates that fail, or, where they hold, what is wrong with the log; that is no longer among the findings then.
 fn decisive(gates: &[Gate], reason: Code, found: &mut Vec<Finding>, terminal: &mut Terminal) {
-    let failed = gates.iter().filter(|gate| !gate.passed);
-    failed.for_each(|gate| paragraph(&gate.words, terminal));
     if let Some(at) = found.iter().position(|finding| finding.code == reason) {
         paragraph(&found.remove(at).message, terminal);
+        return;
     }
+    let failed = gates.iter().filter(|gate| !gate.passed);
+    failed.for_each(|gate| paragraph(&gate.words, terminal));
 }
 
 /// Every gate beside its limits, what was tested, and how much of the motion is new.
@@ -362,9 +365,23 @@ fn score(
     let mut changes = Changes::new(twin, &library, &errors)?;
     for log in &logs.logs {
         let each = (twin, &library, &predictor);
-        scores.score(each, log, findings, &mut |motion| changes.take(motion))?;
+        let mut columns = None;
+        scores.score(each, log, findings, &mut |motion| {
+            if columns.is_none() {
+                columns = Some(no_measurement(twin, motion)?);
+            }
+            changes.take(motion)
+        })?;
+        findings.extend(columns.into_iter().flatten());
     }
     Ok((scores.finish(Split::HeldoutLogs), changes.finish(least)))
+}
+
+/// Torque columns of a log that hold another joint's torque, or one number: what they say of the robot is nothing.
+fn no_measurement(twin: &Twin, motion: &Trajectory) -> Result<Vec<Finding>> {
+    let mut found = self_check(&twin.robot, &twin.pipeline, [motion])?;
+    found.retain(|finding| matches!(finding.code, Code::TorqueCopied | Code::TorqueConstant));
+    Ok(found)
 }
 
 #[cfg(test)]

@@ -47,7 +47,7 @@ pub use scores::{
 };
 
 use crate::calibrate::Calibration;
-use crate::error::{Code, Finding};
+use crate::error::{Code, Finding, Mistake};
 use serde::Serialize;
 
 /// What may be concluded from a calibration.
@@ -71,7 +71,8 @@ impl Assessment {
     }
 }
 
-/// What gates on new `logs` mean for a twin: they decide, and where they hold a mistake in those logs does.
+/// What gates on new `logs` mean for a twin: they decide, and where they hold a mistake in those logs does. Torque that is no measurement of its
+/// joint, or that contradicts the motion, says nothing of the robot: then the mistake decides, whatever the gates say.
 #[must_use]
 pub fn of_gates(
     gates: Vec<Claim>,
@@ -86,8 +87,16 @@ pub fn of_gates(
             false => Claim::of_finding(finding, calibration),
         }
     });
+    let found: Vec<Claim> = found.collect();
+    let says_nothing = found.iter().any(|claim| {
+        let mistake = Mistake::of(claim.code, claim.severity);
+        matches!(
+            mistake,
+            Some(Mistake::NoMeasurement | Mistake::Contradiction)
+        )
+    });
     let mut claims = gates;
-    let decided = answer > Answer::YesWithinLimits;
+    let decided = answer > Answer::YesWithinLimits && !says_nothing;
     claims.extend(found);
     let (answer, reason) = match decided {
         true => (answer, reason),
