@@ -211,6 +211,11 @@ fn gates_decide_before_what_new_logs_are_said_to_be() {
         (Answer::No, Code::ErrorAboveGate)
     );
     assert_eq!(of(Vec::new(), &flipped), (Answer::NotYet, Code::SignFlip));
+    // Torque that nobody measured says nothing of the robot.
+    for code in [Code::TorqueConstant, Code::TorqueCopied] {
+        let dead = [Finding::new(Severity::Degraded, code, "elbow", "", 0)];
+        assert_eq!(of(vec![above()], &dead), (Answer::NotYet, code));
+    }
     assert_eq!(of(Vec::new(), &[]), (Answer::Yes, Code::Passed));
     let short = vec![Claim::of_run(Code::TooShortToCheck)];
     assert_eq!(of(short, &[]), (Answer::NotYet, Code::TooShortToCheck));
