@@ -69,8 +69,11 @@ def test_a_check_of_what_was_fitted_has_the_exit_code_of_its_answer(made):
     assert done.returncode == expected, checked["assessment"]
 
 
-# Numbers that stand behind a message and not in it, or as "> 0.999".
+# Numbers that stand behind a message and not in it, or as "> 0.999" or "a segment".
 BESIDE = {
+    ("short_segments", "segments"),
+    ("joint_stands_still", "cutoff"),
+    ("joint_stands_still", "rest_velocity"),
     ("standstill", "cutoff"),
     ("standstill", "rest_velocity"),
     ("copied_log", "first_row"),

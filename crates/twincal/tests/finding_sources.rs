@@ -258,8 +258,8 @@ fn pieces(template: &str) -> Vec<String> {
         } else if c == '{' {
             len = rest.find('}').map_or(rest.len(), |end| end + 1);
             pieces.push(std::mem::take(&mut piece));
-        } else if rest.starts_with("\\\n") {
-            len = rest.len() - rest[2..].trim_start().len();
+        } else if let Some(next) = rest.strip_prefix("\\\n") {
+            len = rest.len() - next.trim_start().len();
         } else if c == '\\' {
             len = 1 + rest[1..].chars().next().map_or(0, char::len_utf8);
             piece += &rest[1..len];

@@ -155,7 +155,7 @@ impl RowSums {
 
     fn add(&mut self, block: &RowBlock<'_>) {
         let wanted: Vec<usize> = (0..block.len)
-            .filter(|k| (self.rows + k) % self.step == 0)
+            .filter(|k| (self.rows + k).is_multiple_of(self.step))
             .collect();
         self.rows += block.len;
         let no_torque = vec![0.0; block.len];

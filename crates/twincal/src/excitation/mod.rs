@@ -172,7 +172,7 @@ struct Part {
 }
 
 impl Power {
-    fn part(&self, columns: &Vec<usize>, all: &Spectrum) -> Part {
+    fn part(&self, columns: &[usize], all: &Spectrum) -> Part {
         let own = Spectrum::new(
             &directions::block(&self.robot, columns),
             &directions::block(&self.logs, columns),

@@ -188,12 +188,15 @@ pub(super) fn find(root: &Value, steps: &[Step], joint: Joint<'_>) -> Result<Fou
     Ok(found)
 }
 
+/// Fields of a record by name.
+type Fields = [(String, Value)];
+
 /// The fields of a record, and the place of one of them; the paths up to the record and to the field are for messages.
 fn field<'v>(
     value: &'v Value,
     name: &str,
     (before, path): (Written<'_>, Written<'_>),
-) -> Result<(&'v [(String, Value)], usize), String> {
+) -> Result<(&'v Fields, usize), String> {
     let Value::Record(fields) = value else {
         return Err(format!(
             "`{before}` is {}, it has no field `{name}`; correct the path",
