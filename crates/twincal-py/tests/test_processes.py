@@ -77,7 +77,7 @@ few = {"families": ["payload", "viscous", "coulomb"], "generic": False}
 gibbs = {"method": "gibbs", "draws": 400_000}
 
 def regression(method):
-    X = np.random.default_rng(1).standard_normal((500, 30))
+    X = np.random.default_rng(1).standard_normal((500, 60))
     return lambda: getattr(twincal.SpikeSlabRegressor(**gibbs), method)(X, X[:, 0] + X[:, 1])
 
 def statistics():
@@ -115,7 +115,7 @@ def interrupt():
     os.kill(os.getpid(), signal.SIGINT)
 
 try:
-    threading.Timer(1.0, interrupt).start()
+    threading.Timer(0.4, interrupt).start()
     call()
     print("ended by itself", flush=True)
 except KeyboardInterrupt:
@@ -140,7 +140,7 @@ os._exit(0)
     ["design", "fit", "Statistics.fit", "SpikeSlabRegressor.fit", "Calibration.predict"],
 )
 def test_ctrl_c_ends_a_call_within_a_second(arm, call):
-    """A second after the call, when it samples, predicts or searches; a motion that was given up is not written."""
+    """0.4 s after the call, when it samples, predicts or searches; a motion that was given up is not written."""
     if call.startswith("Spike"):
         pytest.importorskip("sklearn")
     done = python(INTERRUPTED, call, arm.model, arm.folder / "run1.csv")
