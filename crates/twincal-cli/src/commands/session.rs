@@ -367,7 +367,7 @@ pub fn merged(sum: &StatisticsFile, other: &StatisticsFile) -> Outcome<Statistic
     Ok(sum)
 }
 
-/// Runs work of a caller of its own: whatever else threads that are shared have to do meanwhile, it is not given up with that.
+/// Runs work of one caller: it is not given up with what the same threads do for another one.
 pub fn apart<T>(work: impl FnOnce() -> T) -> T {
     interrupts::called(None, work)
 }

@@ -262,15 +262,10 @@ pub fn hindrances(before: &Twin, after: &Twin) -> Result<Vec<Finding>> {
         "friction reverses within {old} rad/s (m/s) before and {new} after: its numbers differ for that alone; fit both with \
          [library] coulomb_velocity = {old}"
     );
+    let (severity, code) = (Severity::Warning, Code::CoulombVelocityDiffers);
+    let numbers = [("velocity_before", old), ("velocity_after", new)];
     Ok(vec![
-        Finding::new(
-            Severity::Warning,
-            Code::CoulombVelocityDiffers,
-            "",
-            message,
-            0,
-        )
-        .with([("velocity_before", old), ("velocity_after", new)]),
+        Finding::new(severity, code, "", message, 0).with(numbers),
     ])
 }
 
