@@ -92,12 +92,17 @@ struct Run<'a> {
     length: Length,
 }
 
-/// Bytes that the draws of one chain take: `conditional`, `jumped` and `beta` of its [`Trace`].
+/// Numbers of `conditional`, of `jumped` and of `beta` in the [`Trace`] of so many draws.
+fn lengths(reduced: &Reduced<'_>, draws: usize) -> [usize; 3] {
+    let (count, size) = (reduced.open.blocks.len(), reduced.full.size());
+    [count, count, size].map(|each| each.saturating_mul(draws))
+}
+
+/// Bytes that the draws of one chain take.
 pub(super) fn bytes(reduced: &Reduced<'_>, draws: usize) -> u64 {
-    let numbers = 2 * reduced.open.blocks.len() + reduced.full.size();
-    (size_of::<f32>() as u64)
-        .saturating_mul(numbers as u64)
-        .saturating_mul(draws as u64)
+    let numbers = lengths(reduced, draws).into_iter();
+    let numbers = numbers.fold(0_u64, |all, own| all.saturating_add(own as u64));
+    numbers.saturating_mul(size_of::<f32>() as u64)
 }
 
 impl WithSimd for Run<'_> {
@@ -121,11 +126,13 @@ impl Run<'_> {
         let (size, count) = (target.reduced.full.size(), target.reduced.open.blocks.len());
         let mut state = Chain::new(simd, target, Source::new(seed, chain as u64));
         state.start(simd, chain);
+        let [conditional, jumped, beta] =
+            lengths(target.reduced, length.draws).map(|numbers| vec![0.0; numbers]);
         let mut trace = Trace {
-            conditional: vec![0.0; count * length.draws],
-            jumped: vec![0.0; count * length.draws],
+            conditional,
+            jumped,
             listed: 0,
-            beta: vec![0.0; size * length.draws],
+            beta,
             shift: vec![0.0; size],
             moment: vec![0.0; size],
             inclusion: vec![0.0; count],

@@ -24,8 +24,8 @@ pub struct Pipeline {
     pub motion_cutoff_hz: f64,
     /// Rate of kept rows as asked for, Hz; see [`Pipeline::kept_rate`] for that of a log.
     pub rate_hz: f64,
-    /// Longest sampling interval at which motion is held and columns are evaluated, s: a finer clock is thinned behind a filter
-    /// of its own (`signal/filter/thin.rs`). 0: every sample of the log.
+    /// Longest sampling interval at which motion is held and columns are evaluated, s: a finer clock is thinned behind a separate
+    /// filter (`signal/filter/thin.rs`). 0: every sample of the log.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub motion_interval: f64,
     /// v_s, rad/s or m/s.

@@ -113,7 +113,7 @@ impl<'a> PreparedLog<'a> {
         pieces.map(|piece| piece.time.len()).collect()
     }
 
-    /// Some stretches of it, each a piece of its own: (piece, samples).
+    /// Some stretches of it, each a separate piece: (piece, samples).
     pub(in crate::signal) fn cut(&self, stretches: &[(usize, Range<usize>)]) -> PreparedLog<'_> {
         let piece =
             |(piece, range): &(usize, Range<usize>)| self.pieces.pieces[*piece].lent(range.clone());

@@ -83,7 +83,7 @@ impl Segment {
     }
 }
 
-/// Rows of a log that lie within a segment with a clock of its own, untouched.
+/// Rows of a log that lie within a segment with a separate clock, untouched.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LoggedSamples {
     /// Stamps, s.

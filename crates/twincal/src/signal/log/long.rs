@@ -1,4 +1,4 @@
-//! Logs that are longer than memory should hold: consecutive chapters, each a recording of its own, read when they are needed.
+//! Logs that are longer than memory should hold: consecutive chapters, each a separate recording, read when they are needed.
 //!
 //! For a fit a chapter ends as a log does: filters need some seconds at either end of it, which become no rows (`chapters.rs` visits them).
 //! Angles are unfolded as those of the whole log.
