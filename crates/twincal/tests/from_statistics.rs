@@ -490,3 +490,37 @@ fn a_held_out_copy_is_named() {
     );
     refused(fit.map_err(Error::from), "overlap in time by");
 }
+
+/// Torque of a log that the others contradict is named with the same factor as by a fit to the logs, fitted or held out: the coefficient of a good log
+/// passes 12 standard deviations with probability below 1e-12.
+#[test]
+fn a_log_whose_torque_is_scaled_is_named_as_by_the_fit_to_the_logs() {
+    for odd in [None, Some(1), Some(3)] {
+        let mut study = study(4);
+        if let Some(odd) = odd {
+            for joint in &mut study.logs[odd].joints {
+                let tau = joint.tau.iter_mut().flatten();
+                tau.for_each(|tau| *tau *= 1.4);
+            }
+        }
+        let (fitted, heldout) = study.logs.split_at(3);
+        let settings = &study.settings;
+        let (plan, _) = plan(&study.robot, fitted, settings, &|_| {}).expect("a plan");
+        let sum = study.merged(&plan, 0..3);
+        let own = calibrate_statistics(&sum, heldout, settings, &|_| {}).expect("a fit");
+        let whole = calibrate(&study.robot, fitted, heldout, settings, &|_| {}).expect("a fit");
+        let of_torque = |fit: &Calibration| -> Vec<Finding> {
+            let odd = [Code::LogTorqueFactor, Code::JointTorqueFactor];
+            let all = fit.findings.iter().cloned();
+            all.filter(|own| odd.contains(&own.code)).collect()
+        };
+        let (own, whole) = (of_torque(&own), of_torque(&whole));
+        assert_eq!(own, whole);
+        let named: Vec<&str> = own.iter().map(|own| own.subject.as_str()).collect();
+        let expected = odd.map(|log| format!("log{log}"));
+        assert_eq!(
+            named,
+            expected.iter().map(String::as_str).collect::<Vec<_>>()
+        );
+    }
+}

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use twincal::calibrate::LookedAt;
-use twincal::cross_check::{copies, odd_torque, stuck_encoders};
+use twincal::cross_check::{Compared, copies, odd_torque, stuck_encoders};
 use twincal::incidents::{Incident, motion};
 use twincal::lag::{Lags, lag_findings, lags};
 use twincal::robot::Robot;
@@ -84,8 +84,9 @@ pub(super) fn checkup(
     let found = look(robot, pipeline, &checkup.trajectories)?;
     checkup.joints = found.joints;
     checkup.base = found.base;
-    let all: Vec<&Trajectory> = checkup.trajectories.iter().collect();
-    let odd = odd_torque(robot, pipeline, &all, found.findings.is_empty());
+    let compared = |log| Compared::of(pipeline, log);
+    let all: Vec<Compared<'_>> = checkup.trajectories.iter().map(compared).collect();
+    let odd = odd_torque(robot, &all, found.findings.is_empty());
     checkup.findings.extend(odd);
     checkup.findings.extend(found.findings);
     let trajectories: Vec<&Trajectory> = checkup.trajectories.iter().collect();

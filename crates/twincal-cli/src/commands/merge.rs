@@ -52,13 +52,13 @@ pub(super) fn run(flags: &Merge, terminal: &mut Terminal) -> Outcome<u8> {
     Ok(0)
 }
 
-/// The sum of these files, and their checksums.
+/// The sum of these files for a fit, and their checksums.
 pub(super) fn read(
     paths: &[PathBuf],
     progress: &Progress,
 ) -> Outcome<(StatisticsFile, Vec<FileHash>)> {
     let mut seen = |path: &Path| progress.step(&format!("reading {}", path.to_string_lossy()));
-    let sum = StatisticsFiles::open(paths, &mut seen)?.read()?;
+    let sum = StatisticsFiles::open(paths, &mut seen)?.read_for_fit()?;
     let files = paths.iter().zip(display_names(paths)).map(|(path, name)| {
         let sha256 = sha256_of_file(path)?;
         Ok(FileHash { name, sha256 })

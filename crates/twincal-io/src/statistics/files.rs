@@ -113,8 +113,20 @@ impl StatisticsFiles {
     /// # Errors
     /// [`Error::Content`] for a file that is damaged, or was changed since it was looked at; those of [`FromTables`] with the file.
     pub fn read(self) -> Result<StatisticsFile> {
+        self.sums(|tables, _| tables)
+    }
+
+    /// The sums of all logs with what a fit takes of them, see [`FromTables::for_fit`].
+    ///
+    /// # Errors
+    /// Those of [`StatisticsFiles::read`].
+    pub fn read_for_fit(self) -> Result<StatisticsFile> {
+        self.sums(FromTables::for_fit)
+    }
+
+    fn sums(self, start: impl FnOnce(FromTables, usize) -> FromTables) -> Result<StatisticsFile> {
         let mut readers = Readers::new(&self.files);
-        let mut tables = FromTables::new(self.header)?;
+        let mut tables = start(FromTables::new(self.header)?, self.logs.len());
         for own in &self.logs {
             let reader = readers.of(own.file)?;
             let (row, text) = reader.row(own.row, &own.entry)?;

@@ -22,7 +22,7 @@ use twincal::Finding;
 use twincal::calibrate::{Header, Identity, LogHeader, Quantity, Statistics};
 
 /// What this version writes.
-const FORMAT: u32 = 4;
+const FORMAT: u32 = 5;
 /// Key of the schema's metadata, and the names of the columns.
 const KEY: &str = "twincal.statistics";
 const COLUMNS: [&str; 2] = ["log", "value"];

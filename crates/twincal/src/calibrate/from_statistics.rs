@@ -26,7 +26,7 @@ use super::result::unseen;
 use super::settings::CalibrationSettings;
 use super::stages;
 use super::stopped::Stopped;
-use crate::cross_check::{Sketch, sketched_copies};
+use crate::cross_check::{Compared, Sketch, odd_torque, sketched_copies};
 use crate::error::{Finding, Result};
 use crate::gram::Gram;
 use crate::infer::infer_near;
@@ -39,6 +39,7 @@ use crate::signal::{Log, Logs, ReadyLog, less_driven, ready, torque_rms};
 use crate::statistics::{Purpose, Sums, residual_form};
 use crate::term::Library;
 use crate::twin::Twin;
+use std::borrow::Cow;
 
 /// [`calibrate`](super::calibrate) from the statistics of the logs: the same numbers wherever no row is asked for.
 ///
@@ -125,7 +126,11 @@ fn road(
     };
     findings.extend(data.findings.iter().cloned());
     let pipeline = &statistics.plan.pipeline;
-    findings.extend(self_check(robot, pipeline, trajectories.heldout.iter())?);
+    let checked = self_check(robot, pipeline, trajectories.heldout.iter())?;
+    if pooled.is_none() {
+        findings.extend(odd(statistics, &trajectories, checked.is_empty()));
+    }
+    findings.extend(checked);
     let plan = held_out::plan_of_heldout(&data, &trajectories);
     let (validation, more) = held_out::validate(own, library, plan, Vec::new(), progress)?;
     findings.extend(more);
@@ -358,6 +363,25 @@ fn compared(statistics: &Statistics, (heldout, data): (&Logs<'_>, &Data)) -> Res
     let sizes: Vec<_> = sizes.chain(tested).collect::<Result<_>>()?;
     findings.extend(less_driven(robot, &sizes));
     Ok(findings)
+}
+
+/// Torque of a log, or a joint, that the others contradict. `heldout_is_right`: the self-check found nothing in the held-out logs.
+fn odd(
+    statistics: &Statistics,
+    trajectories: &all_logs::Trajectories,
+    heldout_is_right: bool,
+) -> Vec<Finding> {
+    let (robot, pipeline) = (&statistics.robot, &statistics.plan.pipeline);
+    let fitted = statistics.logs.iter().map(|log| Compared {
+        name: log.name(),
+        payload: log.about.facts.payload,
+        excerpt: Cow::Borrowed(&log.excerpt),
+    });
+    let heldout = trajectories.heldout.iter();
+    let heldout = heldout.map(|log| Compared::of(pipeline, log));
+    let all: Vec<Compared<'_>> = fitted.chain(heldout).collect();
+    let right = heldout_is_right && statistics.logs.iter().all(|log| log.about.signs_are_right);
+    odd_torque(robot, &all, right)
 }
 
 /// Rows and motion of the held-out logs.

@@ -6,7 +6,7 @@ use super::data::log::Log;
 use super::data::reader::{Reader, Role};
 use super::distinct::{Fnv, Identity, require_distinct};
 use super::plan::Plan;
-use crate::cross_check::{Sketch, stuck_encoders};
+use crate::cross_check::{Excerpt, Sketch, stuck_encoders};
 use crate::error::{Error, Finding, Result};
 use crate::gram::{JointAccumulator, JointGram, Workspace};
 use crate::observations::Observations;
@@ -62,6 +62,8 @@ pub(crate) struct LogStatistics {
     pub(crate) raw: Vec<[JointGram; 2]>,
     /// The noise of its torque: copies are found by it.
     pub(crate) noise: Sketch,
+    /// Some of its rows: the logs are compared by them.
+    pub(crate) excerpt: Excerpt,
 }
 
 /// What else is known of a log.
@@ -76,6 +78,8 @@ pub(crate) struct About {
     pub(crate) findings: Vec<Finding>,
     /// Root mean square of each joint's torque as logged, N·m or N.
     pub(crate) torque_rms: Vec<Option<f64>>,
+    /// The self-check found nothing in it.
+    pub(crate) signs_are_right: bool,
 }
 
 impl Statistics {
@@ -111,6 +115,7 @@ impl Statistics {
         let motion = std::iter::once(&trajectory);
         let compared = look(robot, &plan.pipeline, motion)?;
         require_unit(given.name(), &compared)?;
+        let signs_are_right = compared.findings.is_empty();
         findings.extend(compared.findings);
         if log.observations.is_empty() {
             return Err(Error::Statistics {
@@ -129,12 +134,14 @@ impl Statistics {
                 sums,
                 raw,
                 noise,
+                excerpt: Excerpt::of(&plan.pipeline, &trajectory),
                 about: About {
                     facts: LogFacts::of(&log, given.payload()),
                     source: source.to_owned(),
                     reading: String::new(),
                     findings,
                     torque_rms: torque_rms(given)?,
+                    signs_are_right,
                 },
             }],
         })

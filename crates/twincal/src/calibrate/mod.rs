@@ -13,6 +13,7 @@ mod outlook;
 mod plan;
 mod pooled;
 mod progress;
+mod quantity;
 mod records;
 mod request;
 mod result;
@@ -37,7 +38,8 @@ pub use outlook::{LookedAt, Outlook, outlook};
 pub use plan::{About, Plan, VERSION as PLAN_VERSION};
 pub(crate) use pooled::Pooled;
 pub use progress::Stage;
-pub use records::{FromTables, Header, LogHeader, LogTable, Quantity, Record};
+pub use quantity::Quantity;
+pub use records::{FromTables, Header, LogHeader, LogTable, Record};
 pub use result::calibration::{
     Along, Calibration, ComponentSummary, Curve, Draws, Group, LikelihoodUsed, ParameterSummary,
     PriorUsed, TermSummary,

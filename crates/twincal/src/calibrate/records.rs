@@ -3,7 +3,8 @@
 use super::distinct::{Identity, require_distinct};
 use super::log_statistics::{About, LogStatistics, Statistics, require_same};
 use super::plan::Plan;
-use crate::cross_check::Sketch;
+use super::quantity::Quantity;
+use crate::cross_check::{Excerpt, Sketch};
 use crate::error::{Error, Result};
 use crate::excitation::States;
 use crate::gram::{JointGram, Symmetric};
@@ -87,91 +88,6 @@ pub struct Record {
     pub values: Vec<f64>,
 }
 
-/// What the numbers of a [`Record`] are; x is the signals of the joint and its residual torque.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Quantity {
-    /// Σ x xᵀ of a stretch.
-    Products,
-    /// The same of the differences of consecutive rows.
-    Differences,
-    /// Σ x xᵀ of the first rows of runs.
-    First,
-    /// The same of their last rows.
-    Last,
-    /// Σ φ_k xᵀ over decoys φ_k.
-    Decoys,
-    /// Σ φ_k².
-    DecoySquares,
-    /// Σ τ² of the measured torque, stretch by stretch.
-    Torque,
-    /// Power of x in a band of frequencies.
-    Power,
-    /// Σ x xᵀ of torque as logged, at some of the samples.
-    Logged,
-    /// Σ x xᵀ of the filtered rows at the same times.
-    Filtered,
-    /// Positions of the joint in some rows, evenly taken; rad, m.
-    Positions,
-    /// Its velocities there.
-    Velocities,
-    /// Its accelerations there.
-    Accelerations,
-    /// 1 where the joint stands still there, else 0.
-    Still,
-    /// Hashes of patterns in the noise of its torque, ascending: copies of a log have the same.
-    Noise,
-}
-
-impl Quantity {
-    /// All of them.
-    pub const ALL: [Self; 15] = [
-        Self::Products,
-        Self::Differences,
-        Self::First,
-        Self::Last,
-        Self::Decoys,
-        Self::DecoySquares,
-        Self::Torque,
-        Self::Power,
-        Self::Logged,
-        Self::Filtered,
-        Self::Positions,
-        Self::Velocities,
-        Self::Accelerations,
-        Self::Still,
-        Self::Noise,
-    ];
-
-    /// Its name in files.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Products => "products",
-            Self::Differences => "differences",
-            Self::First => "first",
-            Self::Last => "last",
-            Self::Decoys => "decoys",
-            Self::DecoySquares => "decoy_squares",
-            Self::Torque => "torque",
-            Self::Power => "power",
-            Self::Logged => "logged",
-            Self::Filtered => "filtered",
-            Self::Positions => "positions",
-            Self::Velocities => "velocities",
-            Self::Accelerations => "accelerations",
-            Self::Still => "still",
-            Self::Noise => "noise",
-        }
-    }
-
-    /// The quantity of this name.
-    #[must_use]
-    pub fn of_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|own| own.name() == name)
-    }
-}
-
 impl Header {
     /// # Errors
     /// [`Error::Statistics`] for another plan, version or robot: sums of the two do not add.
@@ -197,6 +113,7 @@ impl LogStatistics {
             records.extend(of_joint(joint, sums, self.raw.get(joint as usize)));
             records.extend(of_states(joint, &self.about.facts.states));
             records.push(of_noise(joint, &self.noise));
+            records.extend(of_excerpt(joint, &self.excerpt));
         }
         LogTable { header, records }
     }
@@ -224,6 +141,8 @@ impl Statistics {
 pub struct FromTables {
     statistics: Statistics,
     library: Library,
+    /// See [`FromTables::for_fit`].
+    logs: usize,
 }
 
 impl FromTables {
@@ -243,7 +162,14 @@ impl FromTables {
         Ok(Self {
             statistics,
             library,
+            logs: 0,
         })
+    }
+
+    /// For a fit to so many logs, which compares fewer rows of each: those that it does not need take no memory.
+    #[must_use]
+    pub fn for_fit(self, logs: usize) -> Self {
+        Self { logs, ..self }
     }
 
     /// Adds a log.
@@ -269,12 +195,15 @@ impl FromTables {
             plan: &self.statistics.plan,
             header: &header,
         };
-        let log = taken.log(&self.library)?;
+        let mut log = taken.log(&self.library)?;
         if !taken.records.is_empty() {
             return Err(damaged(&header, "holds more records than its header says"));
         }
         if log.identity().sums != header.sums {
             return Err(damaged(&header, "holds other sums than its header says"));
+        }
+        if self.logs > 0 {
+            log.excerpt = log.excerpt.among(self.logs);
         }
         self.statistics.logs.push(log);
         Ok(())
@@ -319,6 +248,27 @@ fn of_states(joint: u32, states: &States) -> [Record; 4] {
         runs: 0.0,
         values,
     })
+}
+
+/// Channels of an excerpt, and where each joint's stand; those of all joints stand behind them.
+const CHANNELS: usize = 6;
+
+fn of_excerpt(joint: u32, excerpt: &Excerpt) -> Vec<Record> {
+    let places = if joint == 0 {
+        excerpt.places().to_vec()
+    } else {
+        Vec::new()
+    };
+    let lists = excerpt.numbers(joint as usize).into_iter().chain(places);
+    let record = |(block, values)| Record {
+        joint,
+        quantity: Quantity::Excerpt,
+        block,
+        rows: 0.0,
+        runs: 0.0,
+        values,
+    };
+    (0..).zip(lists).map(record).collect()
 }
 
 fn of_noise(joint: u32, noise: &Sketch) -> Record {
@@ -426,7 +376,7 @@ impl Taken<'_> {
             );
         }
         facts.states = self.states(joints)?;
-        let noise = self.noise(joints)?;
+        let (noise, excerpt) = (self.noise(joints)?, self.excerpt(joints)?);
         let acts = !self.plan.payload_where_unknown || facts.payload == Payload::Unknown;
         let recipes = recipes_of_log(library, acts);
         let filtered = self.plan.pipeline.cutoff_hz != 0.0;
@@ -451,7 +401,26 @@ impl Taken<'_> {
             },
             raw,
             noise,
+            excerpt,
         })
+    }
+
+    /// Some rows of all joints.
+    fn excerpt(&mut self, joints: usize) -> Result<Excerpt> {
+        let mut list = |joint, place| -> Result<Vec<f64>> {
+            Ok(self.take(joint, Quantity::Excerpt, place)?.values)
+        };
+        let places = [list(0, CHANNELS)?, list(0, CHANNELS + 1)?];
+        let of_joint = |joint| -> Result<[Vec<f64>; CHANNELS]> {
+            let mut numbers: [Vec<f64>; CHANNELS] = Default::default();
+            for (place, values) in numbers.iter_mut().enumerate() {
+                *values = list(joint, place)?;
+            }
+            Ok(numbers)
+        };
+        let numbers = (0..joints).map(of_joint).collect::<Result<Vec<_>>>()?;
+        let excerpt = Excerpt::of_numbers(places, &numbers);
+        excerpt.ok_or_else(|| self.damaged("has an excerpt of rows that is none"))
     }
 
     /// The noise of all joints.

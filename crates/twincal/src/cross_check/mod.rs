@@ -2,6 +2,7 @@
 
 mod common_fit;
 mod copies;
+mod excerpt;
 mod rows;
 mod signature;
 mod sketch;
@@ -9,6 +10,7 @@ mod stuck;
 mod torque;
 
 pub use copies::copies;
+pub use excerpt::Excerpt;
 pub use sketch::{Sketch, sketched_copies};
 pub use stuck::stuck_encoders;
-pub use torque::odd_torque;
+pub use torque::{Compared, odd_torque};

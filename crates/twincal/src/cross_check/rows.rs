@@ -1,17 +1,11 @@
-//! A few hundred smoothed rows of each log and joint: torque of the model, its regressor, friction's shapes.
+//! The rows of each log and joint as columns: torque of the model, its regressor, friction's shapes.
 
+use super::excerpt::Excerpt;
 use crate::robot::{
     BLOCK, BlockWorkspace, Motion, Regressor, Robot, STRIDE, gravity_regressor, nominal_torque,
 };
-use crate::signal::{Pipeline, Segment, Trajectory};
 use rayon::prelude::*;
 
-/// Rows of one log, at least and at most, and of all logs about.
-const LEAST: usize = 40;
-const MOST: usize = 600;
-const OF_ALL: usize = 12_000;
-/// Width of the moving average in periods of the cut-off.
-const WINDOW: f64 = 0.5;
 /// Velocities of dry friction's shapes, rad/s or m/s.
 const DRY: [f64; 2] = [0.02, 0.2];
 /// Friction of one joint in one log: offset, viscous, and dry friction of two shapes.
@@ -62,151 +56,126 @@ fn bodies(regressor: &Regressor) -> usize {
     pairs.map(|pair| pair.body + 1).max().unwrap_or(0)
 }
 
-/// Smoothed rows of a log before they are columns: `motion[k][joint * len + row]` for position, velocity, acceleration, torque.
-#[derive(Debug, Default)]
-struct Smooth {
-    time: Vec<f64>,
-    starts: Vec<usize>,
-    motion: [Vec<Vec<f64>>; 4],
-    live: Vec<Vec<bool>>,
-}
-
 /// Rows of all logs that have torque; `logs` numbers them as given.
-pub(super) fn blocks(robot: &Robot, pipeline: &Pipeline, logs: &[&Trajectory]) -> Vec<Block> {
+pub(super) fn blocks(robot: &Robot, logs: &[&Excerpt]) -> Vec<Block> {
     let regressor = Regressor::new(robot);
-    let most = (OF_ALL / logs.len().max(1)).clamp(LEAST, MOST);
-    let of_log = |(log, trajectory): (usize, &&Trajectory)| -> Vec<Block> {
-        match smooth(pipeline, trajectory, most) {
-            Some(rows) => of_log(robot, &regressor, log, rows),
-            None => Vec::new(),
+    let of_log = |(log, excerpt): (usize, &&Excerpt)| -> Vec<Block> {
+        let rows = excerpt.among(logs.len());
+        match rows.len() {
+            0 => Vec::new(),
+            _ => of_log((robot, &regressor), log, &rows),
         }
     };
     let all: Vec<Vec<Block>> = logs.par_iter().enumerate().map(of_log).collect();
     all.into_iter().flatten().collect()
 }
 
-/// `None` without torque, or with hardly a row.
-fn smooth(pipeline: &Pipeline, trajectory: &Trajectory, most: usize) -> Option<Smooth> {
-    let total: usize = trajectory.segments.iter().map(|s| s.time.len()).sum();
-    if total == 0 || trajectory.segments.iter().any(|s| s.tau.is_empty()) {
-        return None;
-    }
-    let step = total.div_ceil(most);
-    let dof = trajectory.dof;
-    let mut rows = Smooth {
-        motion: std::array::from_fn(|_| vec![Vec::new(); dof]),
-        live: vec![Vec::new(); dof],
-        ..Smooth::default()
-    };
-    for segment in &trajectory.segments {
-        append(pipeline, segment, step, &mut rows);
-    }
-    (rows.time.len() >= LEAST / 2).then_some(rows)
-}
-
-fn append(pipeline: &Pipeline, segment: &Segment, step: usize, rows: &mut Smooth) {
-    let len = segment.time.len();
-    let half = if pipeline.is_off() {
-        0
-    } else {
-        (0.5 * WINDOW / pipeline.cutoff_hz / segment.interval).round() as usize
-    };
-    let centres = || (half..len.saturating_sub(half)).step_by(step);
-    if centres().next().is_some() {
-        rows.starts.push(rows.time.len());
-    }
-    rows.time.extend(centres().map(|i| segment.time[i]));
-    let from = [&segment.q, &segment.qd, &segment.qdd, &segment.tau];
-    for joint in 0..rows.live.len() {
-        let own = joint * len..(joint + 1) * len;
-        for (to, from) in rows.motion.iter_mut().zip(from) {
-            let values = &from[own.clone()];
-            let mean = |i: usize| {
-                let window = &values[i - half..=i + half];
-                window.iter().sum::<f64>() / window.len() as f64
-            };
-            to[joint].extend(centres().map(mean));
-        }
-        let still = &segment.standstill[own];
-        rows.live[joint].extend(centres().map(|i| !still[i]));
-    }
-}
-
-fn of_log(robot: &Robot, regressor: &Regressor, log: usize, rows: Smooth) -> Vec<Block> {
-    let (dof, len) = (robot.dof(), rows.time.len());
-    let [q, qd, qdd] = [0, 1, 2].map(|k| rows.motion[k].concat());
+fn of_log((robot, regressor): (&Robot, &Regressor), log: usize, rows: &Excerpt) -> Vec<Block> {
+    let [q, qd, qdd, tau] = rows.motion();
+    let len = rows.len();
     let motion = Motion {
         len,
         q: &q,
         qd: &qd,
         qdd: &qdd,
     };
-    let mut nominal = vec![0.0; dof * len];
+    let mut nominal = vec![0.0; robot.dof() * len];
     nominal_torque(robot, motion, &mut nominal);
-    let motor = 10 * bodies(regressor);
-    let mut blocks: Vec<Block> = (0..dof)
-        .map(|joint| {
-            let own = joint * len..(joint + 1) * len;
-            let v = &qd[own.clone()];
-            let mut friction = vec![1.0; len];
-            friction.extend(v);
-            for dry in DRY {
-                friction.extend(v.iter().map(|v| (v / dry).tanh()));
-            }
-            Block {
-                log,
-                joint,
-                time: rows.time.clone(),
-                live: rows.live[joint].clone(),
-                starts: rows.starts.clone(),
-                columns: vec![motor + joint],
-                x: qdd[own.clone()].to_vec(),
-                friction,
-                measured: rows.motion[3][joint].clone(),
-                nominal: nominal[own].to_vec(),
-            }
-        })
-        .collect();
-    let mut first = vec![0; regressor.pairs().len()];
-    for (pair, first) in regressor.pairs().iter().zip(&mut first) {
-        let block = &mut blocks[pair.coordinate];
-        *first = block.columns.len();
-        let present = (0..10).filter(|k| pair.present[*k]);
-        block.columns.extend(present.map(|k| 10 * pair.body + k));
-        block.x.resize(block.columns.len() * len, 0.0);
+    let of_joint = |joint: usize| {
+        let own = joint * len..(joint + 1) * len;
+        Block {
+            log,
+            joint,
+            time: rows.time().to_vec(),
+            live: rows.live(joint).to_vec(),
+            starts: rows.starts().to_vec(),
+            columns: vec![10 * bodies(regressor) + joint],
+            x: qdd[own.clone()].to_vec(),
+            friction: friction(&qd[own.clone()]),
+            measured: tau[own.clone()].to_vec(),
+            nominal: nominal[own].to_vec(),
+        }
+    };
+    let mut blocks: Vec<Block> = (0..robot.dof()).map(of_joint).collect();
+    let places = lay_out(regressor, &mut blocks, len);
+    fill((robot, regressor), motion, &places, &mut blocks);
+    blocks
+}
+
+/// Offset, viscous, and dry friction of two shapes.
+fn friction(qd: &[f64]) -> Vec<f64> {
+    let mut friction = vec![1.0; qd.len()];
+    friction.extend(qd);
+    for dry in DRY {
+        friction.extend(qd.iter().map(|v| (v / dry).tanh()));
     }
-    let mut lean = vec![0; dof];
-    for (block, lean) in blocks.iter_mut().zip(&mut lean) {
-        *lean = block.columns.len();
-        block
-            .columns
-            .extend((0..GRAVITY).map(|axis| motor + dof + axis));
+    friction
+}
+
+/// Where the columns of a block begin.
+struct Places {
+    /// Of each pair of body and joint: of its block, the first inertial parameter.
+    inertia: Vec<usize>,
+    /// Of each joint, gravity along the first axis.
+    gravity: Vec<usize>,
+}
+
+/// Gives the blocks empty columns for inertial parameters and gravity.
+fn lay_out(regressor: &Regressor, blocks: &mut [Block], len: usize) -> Places {
+    let after_motors = 10 * bodies(regressor) + blocks.len();
+    let add = |block: &mut Block, columns: &mut dyn Iterator<Item = usize>| {
+        let first = block.columns.len();
+        block.columns.extend(columns);
         block.x.resize(block.columns.len() * len, 0.0);
-    }
+        first
+    };
+    let inertia = (regressor.pairs().iter()).map(|pair| {
+        let mut own = (0..10)
+            .filter(|k| pair.present[*k])
+            .map(|k| 10 * pair.body + k);
+        add(&mut blocks[pair.coordinate], &mut own)
+    });
+    let inertia = inertia.collect();
+    let gravity = blocks.iter_mut().map(|block| {
+        let mut own = (0..GRAVITY).map(|axis| after_motors + axis);
+        add(block, &mut own)
+    });
+    let gravity = gravity.collect();
+    Places { inertia, gravity }
+}
+
+/// Fills the columns of inertial parameters and gravity.
+fn fill(
+    (robot, regressor): (&Robot, &Regressor),
+    motion: Motion<'_>,
+    places: &Places,
+    blocks: &mut [Block],
+) {
+    let len = motion.len;
     let mut cells = regressor.block(robot);
     let mut workspace = BlockWorkspace::new(robot);
-    let mut gravity = vec![0.0; GRAVITY * dof * STRIDE];
+    let mut gravity = vec![0.0; GRAVITY * robot.dof() * STRIDE];
     for from in (0..len).step_by(BLOCK) {
         let samples = from..(from + BLOCK).min(len);
+        let put = |block: &mut Block, column: usize, values: &[f64]| {
+            let start = column * len;
+            block.x[start + samples.start..start + samples.end]
+                .copy_from_slice(&values[..samples.len()]);
+        };
         regressor.evaluate(robot, motion, samples.clone(), &mut cells);
         gravity_regressor(robot, &mut workspace, motion, samples.clone(), &mut gravity);
         for (joint, block) in blocks.iter_mut().enumerate() {
             for axis in 0..GRAVITY {
                 let own = (GRAVITY * joint + axis) * STRIDE;
-                let start = (lean[joint] + axis) * len;
-                block.x[start + samples.start..start + samples.end]
-                    .copy_from_slice(&gravity[own..own + samples.len()]);
+                put(block, places.gravity[joint] + axis, &gravity[own..]);
             }
         }
         for (index, pair) in regressor.pairs().iter().enumerate() {
-            let block = &mut blocks[pair.coordinate];
             let present = (0..10).filter(|k| pair.present[*k]);
             for (place, k) in present.enumerate() {
-                let start = (first[index] + place) * len;
-                block.x[start + samples.start..start + samples.end]
-                    .copy_from_slice(&cells.column(index, k)[..samples.len()]);
+                let column = places.inertia[index] + place;
+                put(&mut blocks[pair.coordinate], column, cells.column(index, k));
             }
         }
     }
-    blocks
 }

@@ -1,12 +1,14 @@
 //! Torque of one log or one joint that is scaled, turned, or on a clock of its own, by a common fit of all logs and joints.
 
 use super::common_fit::{CommonFit, Effect, Fitted};
+use super::excerpt::Excerpt;
 use super::rows::{Block, blocks, parameters};
 use crate::error::{Code, Finding, Severity};
-use crate::rigid_fit::{Bins, bins, leaning, settle};
+use crate::rigid_fit::{Bins, leaning, settle};
 use crate::robot::Robot;
-use crate::signal::{Pipeline, Trajectory};
+use crate::signal::{Payload, Pipeline, Trajectory};
 use crate::words::significant;
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 /// Standard deviations from which a factor is believed. Real logs without a fault reach 10 (double pendulum, whose friction is not the same in each run), simulated
@@ -37,6 +39,29 @@ const CLOCKS: f64 = 3e-4;
 /// By how much the lag of a log differs from the others', s, from which it matters, and what that explains at least: LuGre friction looks like 29 ms with less.
 const LATE: f64 = 0.01;
 const EXPLAINS_LAG: f64 = 0.3;
+
+/// A log as it is compared with others.
+#[derive(Debug, Clone)]
+pub struct Compared<'a> {
+    /// Its name.
+    pub name: &'a str,
+    /// What the robot carried.
+    pub payload: Payload,
+    /// Some of its rows.
+    pub excerpt: Cow<'a, Excerpt>,
+}
+
+impl<'a> Compared<'a> {
+    /// Of a filtered log.
+    #[must_use]
+    pub fn of(pipeline: &Pipeline, trajectory: &'a Trajectory) -> Self {
+        Self {
+            name: &trajectory.name,
+            payload: trajectory.payload,
+            excerpt: Cow::Owned(Excerpt::of(pipeline, trajectory)),
+        }
+    }
+}
 
 /// Whose torque.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -83,26 +108,18 @@ impl Whose {
 /// | `log_torque_lag` | torque of a log is late or early, that of the others is not |
 /// | `clock_drift` | the lag of torque behind the motion grows over the log |
 ///
-/// Nothing is said of logs with different payloads. `signs_are_right`: [`self_check`](crate::self_check::self_check) found nothing; else joints are not compared.
-pub fn odd_torque(
-    robot: &Robot,
-    pipeline: &Pipeline,
-    logs: &[&Trajectory],
-    signs_are_right: bool,
-) -> Vec<Finding> {
+/// Nothing is said of logs with different payloads. `signs_are_right`: [`self_check`](crate::self_check::self_check) found nothing; else
+/// joints are not compared.
+pub fn odd_torque(robot: &Robot, logs: &[Compared<'_>], signs_are_right: bool) -> Vec<Finding> {
     let alike = logs
         .windows(2)
         .all(|pair| pair[0].payload == pair[1].payload);
-    let fit = if alike {
-        common_fit(robot, pipeline, logs)
-    } else {
-        None
-    };
+    let fit = if alike { common_fit(robot, logs) } else { None };
     let Some(mut fit) = fit else {
         return Vec::new();
     };
     let names = Names {
-        logs: logs.iter().map(|log| log.name.as_str()).collect(),
+        logs: logs.iter().map(|log| log.name).collect(),
         joints: robot.joint_names(),
     };
     let mut findings = Vec::new();
@@ -119,15 +136,14 @@ pub fn odd_torque(
 
 /// The common fit, about the lean of the base where it sees one; `None` where too little moves. How far the base leans, under which inertias, the
 /// robust fit says, which holds both near the model's: with all of them free gravity may be anything.
-fn common_fit(robot: &Robot, pipeline: &Pipeline, logs: &[&Trajectory]) -> Option<CommonFit> {
-    let fit = |robot: &Robot| CommonFit::new(blocks(robot, pipeline, logs), parameters(robot));
+fn common_fit(robot: &Robot, logs: &[Compared<'_>]) -> Option<CommonFit> {
+    let excerpts: Vec<&Excerpt> = logs.iter().map(|log| &*log.excerpt).collect();
+    let fit = |robot: &Robot| CommonFit::new(blocks(robot, &excerpts), parameters(robot));
     let upright = fit(robot)?;
     if leaning(robot, upright.gravity(), &[]).is_none() {
         return Some(upright);
     }
-    let bins: Vec<Bins> = (logs.iter())
-        .flat_map(|log| bins(robot, pipeline, log, &[]))
-        .collect();
+    let bins: Vec<Bins> = excerpts.iter().map(|own| own.bins()).collect();
     match settle(robot, &bins).map(|settled| settled.robot) {
         Some(turned) if turned.description().gravity != robot.description().gravity => fit(&turned),
         _ => Some(upright),

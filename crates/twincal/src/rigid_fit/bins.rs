@@ -123,6 +123,25 @@ impl Bins {
         }
     }
 
+    /// Each row as one bin. `motion`: position, velocity, acceleration and torque, joint by joint; `zones` likewise.
+    pub(crate) fn of_rows(time: &[f64], motion: &[Vec<f64>; 4], zones: Vec<Zone>) -> Self {
+        let count = time.len();
+        let of_joint = |joint: usize| {
+            let own = |values: &Vec<f64>| values[joint * count..(joint + 1) * count].to_vec();
+            let [q, qd, qdd, tau] = motion.each_ref().map(own);
+            let [slow, fast] = DRY.map(|dry| qd.iter().map(|v| (v / dry).tanh()).collect());
+            Numbers::Memory([tau, q, qd, qdd, slow, fast].concat())
+        };
+        let joints = 0..zones.len().checked_div(count).unwrap_or(0);
+        Self {
+            intervals: [0.0; 2],
+            spans: time.iter().map(|stamp| [*stamp; 2]).collect(),
+            width: 1,
+            joints: joints.map(of_joint).collect(),
+            zones,
+        }
+    }
+
     /// How many bins there are.
     pub(crate) fn len(&self) -> usize {
         self.spans.len()
@@ -164,36 +183,62 @@ fn zones(
     let len = segment.time.len();
     let own = joint * len..(joint + 1) * len;
     let (velocity, still) = (&segment.qd[own.clone()], &segment.standstill[own]);
-    let bins = velocity.chunks_exact(width);
-    let ends: Vec<[f64; 2]> = bins
-        .map(|bin| {
-            let least = bin.iter().copied().fold(f64::INFINITY, f64::min);
-            [least, bin.iter().copied().fold(f64::NEG_INFINITY, f64::max)]
-        })
-        .collect();
-    let slow: Vec<bool> = (ends.iter())
-        .map(|[least, most]| least * most <= 0.0 || least.abs().min(most.abs()) < SLOW)
-        .collect();
+    let ends: Vec<[f64; 2]> = velocity.chunks_exact(width).map(ends).collect();
+    let slow: Vec<bool> = ends.iter().map(is_slow).collect();
     let off = |span: &[f64; 2]| {
         let overlaps = |[from, to]: &[f64; 2]| span[1] >= *from && span[0] <= *to;
         stopped.iter().any(overlaps)
     };
     let zone = |i: usize| {
-        let [least, most] = ends[i];
-        let fastest = least.abs().max(most.abs());
         let masked = still[i * width..(i + 1) * width].iter().any(|still| *still);
         let near = i.saturating_sub(MEMORY)..(i + MEMORY + 1).min(slow.len());
-        if off(&spans[i]) || masked && fastest > 2.0 * SLOW {
-            Zone::Unknown
-        } else if fastest < REST {
-            Zone::Rests
-        } else if slow[near].iter().any(|slow| *slow) {
-            Zone::Reverses
-        } else {
-            Zone::Slides
+        let turns = || slow[near].iter().any(|slow| *slow);
+        match off(&spans[i]) {
+            true => Zone::Unknown,
+            false => Zone::of(ends[i], masked, turns),
         }
     };
     (0..ends.len()).map(zone).collect()
+}
+
+/// Least and largest velocity.
+fn ends(velocity: &[f64]) -> [f64; 2] {
+    let least = velocity.iter().copied().fold(f64::INFINITY, f64::min);
+    let most = velocity.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    [least, most]
+}
+
+/// It turns round or creeps.
+fn is_slow([least, most]: &[f64; 2]) -> bool {
+    least * most <= 0.0 || least.abs().min(most.abs()) < SLOW
+}
+
+impl Zone {
+    /// Where velocity has these ends, torque is masked somewhere or not, and the joint turns round or creeps nearby.
+    fn of([least, most]: [f64; 2], masked: bool, turns: impl FnOnce() -> bool) -> Self {
+        let fastest = least.abs().max(most.abs());
+        if masked && fastest > 2.0 * SLOW {
+            Self::Unknown
+        } else if fastest < REST {
+            Self::Rests
+        } else if turns() {
+            Self::Reverses
+        } else {
+            Self::Slides
+        }
+    }
+
+    /// Zone of a joint in these samples of a segment, without what is known of its drives.
+    pub(crate) fn at(segment: &Segment, joint: usize, samples: &Range<usize>) -> Self {
+        let len = segment.time.len();
+        let own = joint * len..(joint + 1) * len;
+        let (velocity, still) = (&segment.qd[own.clone()], &segment.standstill[own]);
+        let memory = (MEMORY as f64 * WIDTH / segment.interval).round() as usize;
+        let near = samples.start.saturating_sub(memory)..(samples.end + memory).min(len);
+        let masked = still[samples.clone()].iter().any(|still| *still);
+        let turns = || is_slow(&ends(&velocity[near]));
+        Self::of(ends(&velocity[samples.clone()]), masked, turns)
+    }
 }
 
 impl JointBins<'_> {

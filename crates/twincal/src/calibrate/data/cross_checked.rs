@@ -2,10 +2,11 @@
 
 use super::all_logs::Trajectories;
 use crate::calibrate::stopped::Stopped;
-use crate::cross_check::{copies, odd_torque, stuck_encoders};
+use crate::cross_check::{Compared, copies, odd_torque, stuck_encoders};
 use crate::error::{Finding, Result};
 use crate::robot::Robot;
 use crate::signal::{Log, Logs, Pipeline, Trajectory};
+use rayon::prelude::*;
 
 /// Findings on logs as recorded; logs to fit come first.
 pub(in crate::calibrate) fn as_recorded(
@@ -32,5 +33,8 @@ pub(in crate::calibrate) fn as_filtered(
     compared: &[Finding],
 ) -> Vec<Finding> {
     let all: Vec<&Trajectory> = trajectories.all().collect();
-    odd_torque(robot, pipeline, &all, compared.is_empty())
+    let all: Vec<Compared<'_>> = (all.par_iter())
+        .map(|log| Compared::of(pipeline, log))
+        .collect();
+    odd_torque(robot, &all, compared.is_empty())
 }

@@ -27,8 +27,13 @@ fn logs(seed: u32, count: u32) -> Vec<Trajectory> {
 }
 
 fn said(logs: &[Trajectory]) -> Vec<Finding> {
-    let logs: Vec<&Trajectory> = logs.iter().collect();
-    odd_torque(&arm(1.0), &pipeline(), &logs, true)
+    odd_torque(&arm(1.0), &compared(logs), true)
+}
+
+fn compared(logs: &[Trajectory]) -> Vec<Compared<'_>> {
+    logs.iter()
+        .map(|log| Compared::of(&pipeline(), log))
+        .collect()
 }
 
 fn places(findings: &[Finding]) -> Vec<(&str, &str)> {
@@ -65,7 +70,7 @@ fn good_logs_are_passed_in_silence() {
 fn a_base_that_leans_under_an_unknown_payload_leaves_noise() {
     let left = |robot: &Robot| {
         let logs = [0.0, 3.1, 6.2].map(|seed| log_of(robot, seed));
-        let fit = common_fit(&arm(1.0), &pipeline(), &logs.each_ref()).unwrap();
+        let fit = common_fit(&arm(1.0), &compared(&logs)).unwrap();
         fit.left(|_| true)
     };
     let [leans, upright] = [leaning_and_loaded(12.0), leaning_and_loaded(0.0)].map(|r| left(&r));
