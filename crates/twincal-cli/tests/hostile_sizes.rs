@@ -36,14 +36,18 @@ fn fan(count: usize, name: &str) -> String {
     text + "</robot>"
 }
 
+/// Writes a model, which is refused.
+#[track_caller]
+fn refused_model(folder: &Path, name: &str, text: &str, words: &[&str]) {
+    fs::write(folder.join(name), text).unwrap();
+    refused(folder, &format!("inspect {name}"), words);
+}
+
 #[test]
 fn models_with_too_much_in_them_are_refused() {
     let folder = folder();
-    let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
-    let inspect = |name: &str, text: &str, words: &[&str]| {
-        write(name, text);
-        refused(folder.path(), &format!("inspect {name}"), words);
-    };
+    let inspect =
+        |name: &str, text: &str, words: &[&str]| refused_model(folder.path(), name, text, words);
     let body = |i: usize| format!("<body name=\"b{i}\"><joint name=\"j{i}\"/></body>");
     let many: String = (0..100_000).map(body).collect();
     let world = |inner: &str| format!("<mujoco><worldbody>{inner}</worldbody></mujoco>");
@@ -72,6 +76,21 @@ fn models_with_too_much_in_them_are_refused() {
         &world(&"<a/>".repeat(7_000_000)),
         &["d.xml:1:", items],
     );
+    // A name of a megabyte.
+    let long = fan(2, "l").replace("l1", &"x".repeat(1 << 20));
+    inspect(
+        "f.urdf",
+        &long,
+        &["f.urdf:1:", "has 1048576 bytes, the limit is 4096"],
+    );
+}
+
+/// Few elements that stand for many.
+#[test]
+fn models_that_grow_when_they_are_read_are_refused() {
+    let folder = folder();
+    let inspect =
+        |name: &str, text: &str, words: &[&str]| refused_model(folder.path(), name, text, words);
     // Each class holds all that the one around it states.
     let stated = "<joint range=\"0 1\" damping=\"1\" armature=\"1\"/>".repeat(1000);
     let classes: String = (0..9000)
@@ -85,14 +104,7 @@ fn models_with_too_much_in_them_are_refused() {
         &nested,
         &["e.xml:1:", "hold more than 1000000 attributes"],
     );
-    // A name of a megabyte.
-    let long = fan(2, "l").replace("l1", &"x".repeat(1 << 20));
-    inspect(
-        "f.urdf",
-        &long,
-        &["f.urdf:1:", "has 1048576 bytes, the limit is 4096"],
-    );
-    write("part.xml", "<mujocoinclude/>");
+    fs::write(folder.path().join("part.xml"), "<mujocoinclude/>").unwrap();
     let fan_out = format!(
         "<mujoco>{}</mujoco>",
         "<include file=\"part.xml\"/>".repeat(100_000)
@@ -227,7 +239,11 @@ fn bags_with_too_much_in_them_are_refused() {
     let file = fs::File::options().append(true).open(&path).unwrap();
     file.set_len(1 << 39).unwrap();
     inspect(&["the file is cut off at byte 8"]);
+}
 
+#[test]
+fn folders_of_bags_with_too_much_in_their_metadata_are_refused() {
+    let folder = folder();
     let bag = folder.path().join("bag");
     fs::create_dir(&bag).unwrap();
     mcap(

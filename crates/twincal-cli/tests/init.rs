@@ -103,46 +103,7 @@ fn init_fixes_units_signs_and_order_and_the_twin_reads_new_logs_likewise() {
             .as_f64()
             .unwrap()
     };
-    let degrees: fn(&mut [f64; 7]) = |row| row[1..5].iter_mut().for_each(|v| *v *= 360.0 / TAU);
-    let one: fn(&mut [f64; 7]) = |row| [2, 4].into_iter().for_each(|k| row[k] *= 360.0 / TAU);
-    let turned: fn(&mut [f64; 7]) = |row| {
-        row[6] *= -1.0;
-        [1, 3, 5].into_iter().for_each(|k| row[k] *= -1.0);
-    };
-    let position: fn(&mut [f64; 7]) = |row| row[1] *= -1.0;
-    let velocity: fn(&mut [f64; 7]) = |row| row[3] *= -1.0;
-    let thousandths: fn(&mut [f64; 7]) = |row| row[5..7].iter_mut().for_each(|v| *v *= 1e3);
-    let exchanged: fn(&mut [f64; 7]) = |row| {
-        row.swap(1, 2);
-        row.swap(3, 4);
-        row.swap(5, 6);
-    };
-    let all_at_once: fn(&mut [f64; 7]) = |row| {
-        row[0] *= 1e3;
-        row[1..5].iter_mut().for_each(|v| *v *= 360.0 / TAU);
-        row[5] *= -1e3;
-        row[6] *= 1e3;
-    };
-    for (change, line) in [
-        (all_at_once, "time_unit = \"ms\""),
-        (all_at_once, "tau = { elbow = 0.001, shoulder = -0.001 }"),
-        (
-            degrees,
-            "[columns.factor]\nq = 0.017453292519943295\nqd = 0.0174",
-        ),
-        (
-            one,
-            "[columns.factor]\nq = { elbow = 0.017453292519943295 }\n",
-        ),
-        (position, "[columns.factor]\nq = { shoulder = -1.0 }\n"),
-        (velocity, "[columns.factor]\nqd = { shoulder = -1.0 }\n"),
-        (thousandths, "[columns.factor]\ntau = 0.001\n"),
-        (turned, "tau = -1.0\n"),
-        (
-            exchanged,
-            "[columns.tau]\nelbow = \"tau1\"\nshoulder = \"tau2\"",
-        ),
-    ] {
+    for (change, line) in faults() {
         let folder = folder(Fault { change, ..GOOD });
         let text = proposed(&folder);
         assert!(text.contains(line), "{line}: {text}");
@@ -169,4 +130,50 @@ fn init_fixes_units_signs_and_order_and_the_twin_reads_new_logs_likewise() {
             );
         }
     }
+}
+
+type Change = fn(&mut [f64; 7]);
+
+/// What is done to a row of a log, and a line that the config gets by it.
+fn faults() -> [(Change, &'static str); 9] {
+    let degrees: Change = |row| row[1..5].iter_mut().for_each(|v| *v *= 360.0 / TAU);
+    let one: Change = |row| [2, 4].into_iter().for_each(|k| row[k] *= 360.0 / TAU);
+    let turned: Change = |row| {
+        row[6] *= -1.0;
+        [1, 3, 5].into_iter().for_each(|k| row[k] *= -1.0);
+    };
+    let position: Change = |row| row[1] *= -1.0;
+    let velocity: Change = |row| row[3] *= -1.0;
+    let thousandths: Change = |row| row[5..7].iter_mut().for_each(|v| *v *= 1e3);
+    let exchanged: Change = |row| {
+        row.swap(1, 2);
+        row.swap(3, 4);
+        row.swap(5, 6);
+    };
+    let all_at_once: Change = |row| {
+        row[0] *= 1e3;
+        row[1..5].iter_mut().for_each(|v| *v *= 360.0 / TAU);
+        row[5] *= -1e3;
+        row[6] *= 1e3;
+    };
+    [
+        (all_at_once, "time_unit = \"ms\""),
+        (all_at_once, "tau = { elbow = 0.001, shoulder = -0.001 }"),
+        (
+            degrees,
+            "[columns.factor]\nq = 0.017453292519943295\nqd = 0.0174",
+        ),
+        (
+            one,
+            "[columns.factor]\nq = { elbow = 0.017453292519943295 }\n",
+        ),
+        (position, "[columns.factor]\nq = { shoulder = -1.0 }\n"),
+        (velocity, "[columns.factor]\nqd = { shoulder = -1.0 }\n"),
+        (thousandths, "[columns.factor]\ntau = 0.001\n"),
+        (turned, "tau = -1.0\n"),
+        (
+            exchanged,
+            "[columns.tau]\nelbow = \"tau1\"\nshoulder = \"tau2\"",
+        ),
+    ]
 }

@@ -89,12 +89,10 @@ fn components_are_those_of_a_fit_with_the_same_config() {
     assert!(without["components"][0]["seen"].is_null() && without["directions"].is_null());
 }
 
-#[test]
-fn an_elbow_that_stands_still_is_asked_to_move() {
-    let folder = folder();
-    // Torque of the arm with q2 = 0.3 (see `csv`), and white noise of 0.02 N·m.
+/// A log with q2 = 0.3, the torque of the arm at it (see `csv`), and white noise of 0.02 N·m.
+fn log_with_elbow_at_rest() -> String {
     let (near, cross, (s, c)) = (0.0325, 0.06, 0.3_f64.sin_cos());
-    let still = csv(400, &|row_number, mut row| {
+    csv(400, &|row_number, mut row| {
         let number = |k: usize| row[k].parse::<f64>().unwrap();
         let (v, a) = (number(3), number(5));
         let noise = |k: f64| ((row_number as f64 + k) * 12.9898).sin() * 43_758.545;
@@ -105,8 +103,13 @@ fn an_elbow_that_stands_still_is_asked_to_move() {
             row[column] = value.to_string();
         }
         row
-    });
-    fs::write(folder.path().join("run.csv"), still).unwrap();
+    })
+}
+
+#[test]
+fn an_elbow_that_stands_still_is_asked_to_move() {
+    let folder = folder();
+    fs::write(folder.path().join("run.csv"), log_with_elbow_at_rest()).unwrap();
     let config = "[signal]\ncutoff_hz = 0\n[library]\nfamilies = [\"viscous\", \"coulomb\", \"mass_moments\", \"tensor\"]\n\
                   generic = false\n";
     fs::write(folder.path().join("quick.toml"), config).unwrap();

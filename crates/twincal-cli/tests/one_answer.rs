@@ -54,7 +54,13 @@ fn one_answer(folder: &Path, more: &[&str]) -> (String, String) {
     let page = fs::read_to_string(folder.join("out/report.html")).unwrap();
     let page = page.replace("&#x27;", "'").replace("<wbr>", "");
     assert!(page.contains(&headline), "{headline}");
-    let doubtful = answer != "yes";
+    doubt_is_said(folder, answer != "yes");
+    check_follows_its_answer(folder);
+    (answer, reason)
+}
+
+/// `predict`, `export` and `diff` ask whether a doubtful twin can be used, and only of such a one.
+fn doubt_is_said(folder: &Path, doubtful: bool) {
     let commands: [&[&str]; 3] = [
         &["predict", "--twin", "out", "run.csv", "-o", "torque.csv"],
         &[
@@ -84,8 +90,6 @@ fn one_answer(folder: &Path, more: &[&str]) -> (String, String) {
             said.err
         );
     }
-    check_follows_its_answer(folder);
-    (answer, reason)
 }
 
 /// `check` of the fitted log: its exit code is that of its own answer.

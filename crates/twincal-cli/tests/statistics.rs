@@ -61,11 +61,11 @@ fn a_fit_to_statistics_is_the_fit_to_the_logs() {
     let folder = logs();
     let at = folder.path();
     made(at);
-    let all = [
-        "st/run0.csv.arrow",
-        "st/run1.csv.arrow",
-        "st/run2.csv.arrow",
-    ];
+    let fit = |more: &str| {
+        let all = "st/run0.csv.arrow st/run1.csv.arrow st/run2.csv.arrow";
+        let line = format!("fit --statistics {all} --config quick.toml {more}");
+        run(at, line.split(' '))
+    };
     assert_eq!(
         files(&at.join("st")),
         [
@@ -78,11 +78,7 @@ fn a_fit_to_statistics_is_the_fit_to_the_logs() {
     );
     let line = "fit run0.csv run1.csv run2.csv --model arm.urdf --config quick.toml --heldout run3.csv -o whole";
     run(at, line.split(' ')).expect(0);
-    let line = format!(
-        "fit --statistics {} --config quick.toml --heldout run3.csv -o own",
-        all.join(" ")
-    );
-    run(at, line.split(' ')).expect(0);
+    fit("--heldout run3.csv -o own").expect(0);
     let (own, whole) = (result(at, "own"), result(at, "whole"));
     for key in [
         "components",
@@ -105,11 +101,7 @@ fn a_fit_to_statistics_is_the_fit_to_the_logs() {
         fs::read(at.join("whole.urdf")).unwrap()
     );
     // Nothing held out.
-    let line = format!(
-        "fit --statistics {} --config quick.toml -o alone",
-        all.join(" ")
-    );
-    let done = run(at, line.split(' ')).expect(3);
+    let done = fit("-o alone").expect(3);
     assert!(
         done.out.contains("Torque error: not tested"),
         "{}",

@@ -125,17 +125,23 @@ fn check_says_which_gate_failed() {
     .expect(0);
 }
 
-/// Torque of motors, fifty times smaller than at the joints: `check` and `predict` take it as the fit did, and say so.
-#[test]
-fn new_logs_are_read_as_those_of_the_fit_were() {
-    let motors = csv(400, &|_, mut row| {
+/// A log with the torque of motors, fifty times smaller than at the joints, and its config.
+fn motors() -> (String, String) {
+    let log = csv(400, &|_, mut row| {
         for cell in &mut row[7..9] {
             *cell = (number(cell) / 50.0).to_string();
         }
         row
     });
     let torque = "[log]\ntorque = \"motor\"\ngear_ratio = { shoulder = 50.0, elbow = 50.0 }\n";
-    let (folder, done) = fitted_with(&motors, &format!("{}{torque}", common::QUICK));
+    (log, format!("{}{torque}", common::QUICK))
+}
+
+/// `check` and `predict` take torque as the fit did, and say so.
+#[test]
+fn new_logs_are_read_as_those_of_the_fit_were() {
+    let (motors, config) = motors();
+    let (folder, done) = fitted_with(&motors, &config);
     done.expect(0);
     fs::write(
         folder.path().join("gates.toml"),
@@ -166,22 +172,6 @@ fn new_logs_are_read_as_those_of_the_fit_were() {
         );
     }
     assert_eq!(said(&checked(&["--config", "joint.toml"], 1)), None);
-    // columns are those of the fit as well (tests/as_fitted.rs)
-    fs::write(
-        folder.path().join("other.csv"),
-        motors.replacen("q1", "angle", 1),
-    )
-    .unwrap();
-    let columns = format!(
-        "{}{torque}[columns]\nq = {{ shoulder = \"angle\" }}\n",
-        common::QUICK
-    );
-    fs::write(folder.path().join("columns.toml"), columns).unwrap();
-    let line = "fit other.csv --model arm.urdf --config columns.toml -o named";
-    run(folder.path(), line.split(' ')).expect(0);
-    run(folder.path(), ["check", "other.csv", "--twin", "named"]).expect(0);
-    let line = "check other.csv --twin named --config columns.toml";
-    run(folder.path(), line.split(' ')).expect(0);
     let predicted = run(folder.path(), ["predict", "run.csv", "--twin", "out"]).expect(0);
     let lines: Vec<Vec<&str>> = predicted
         .out
@@ -194,6 +184,25 @@ fn new_logs_are_read_as_those_of_the_fit_were() {
         .unwrap();
     let row = motors.lines().nth(1).unwrap().split(',').nth(7).unwrap();
     assert!((number(lines[1][column]) - 50.0 * number(row)).abs() < 1e-9);
+}
+
+/// See also `as_fitted.rs`.
+#[test]
+fn columns_of_new_logs_are_those_of_the_fit() {
+    let (motors, config) = motors();
+    let folder = folder();
+    fs::write(
+        folder.path().join("other.csv"),
+        motors.replacen("q1", "angle", 1),
+    )
+    .unwrap();
+    let columns = format!("{config}[columns]\nq = {{ shoulder = \"angle\" }}\n");
+    fs::write(folder.path().join("columns.toml"), columns).unwrap();
+    let line = "fit other.csv --model arm.urdf --config columns.toml -o named";
+    run(folder.path(), line.split(' ')).expect(0);
+    run(folder.path(), ["check", "other.csv", "--twin", "named"]).expect(0);
+    let line = "check other.csv --twin named --config columns.toml";
+    run(folder.path(), line.split(' ')).expect(0);
 }
 
 #[test]

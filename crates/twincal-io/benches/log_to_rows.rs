@@ -11,8 +11,9 @@
 mod logs;
 
 use std::time::Instant;
+use twincal::robot::Robot;
 use twincal::rows::{RowSignal, visit_rows};
-use twincal::signal::{Auto, SignalSettings, align, choose_pipeline};
+use twincal::signal::{Auto, Pipeline, SignalSettings, Trajectory, align, choose_pipeline};
 use twincal::term::{Family, Library, LibrarySettings};
 use twincal_io::log::{LogOptions, read_csv, read_log};
 use twincal_io::table::{ColumnKind, TableFormat, TableWriter, Values};
@@ -55,7 +56,25 @@ fn main() {
             .0
     });
     say("read/csv/9_columns", seconds, Some(text.len()));
+    tables(&log, &robot, &options);
+    let settings = SignalSettings {
+        cutoff_hz: Auto::Auto,
+        rate_hz: Auto::Auto,
+        coulomb_velocity: None,
+        corrections: twincal::signal::Corrections::default(),
+        every_sample: false,
+    };
+    let logs = [recording];
+    let (seconds, pipeline) =
+        shortest(|| choose_pipeline(&robot, &logs, &settings).expect("moves").0);
+    say("choose_pipeline/2_joints", seconds, None);
+    let (seconds, trajectory) = shortest(|| align(&robot, &logs[0], &pipeline).expect("moves").0);
+    say("align/2_joints", seconds, None);
+    rows(&robot, &pipeline, &trajectory);
+}
 
+/// Tables written, and the Parquet one read again.
+fn tables(log: &logs::LogText, robot: &Robot, options: &LogOptions) {
     let columns: Vec<(String, ColumnKind)> = log
         .header
         .iter()
@@ -84,31 +103,21 @@ fn main() {
             let file = tempfile::NamedTempFile::new().expect("a file");
             std::fs::write(file.path(), &written).expect("a file");
             let (seconds, _) =
-                shortest(|| read_log(file.path(), &robot, &options).expect("readable"));
+                shortest(|| read_log(file.path(), robot, options).expect("readable"));
             say("read/parquet/9_columns", seconds, Some(written.len()));
         }
     }
+}
 
-    let logs = [recording];
-    let settings = SignalSettings {
-        cutoff_hz: Auto::Auto,
-        rate_hz: Auto::Auto,
-        coulomb_velocity: None,
-        corrections: twincal::signal::Corrections::default(),
-        every_sample: false,
-    };
-    let (seconds, pipeline) =
-        shortest(|| choose_pipeline(&robot, &logs, &settings).expect("moves").0);
-    say("choose_pipeline/2_joints", seconds, None);
-    let (seconds, trajectory) = shortest(|| align(&robot, &logs[0], &pipeline).expect("moves").0);
-    say("align/2_joints", seconds, None);
+/// Rows of friction, filtered and raw.
+fn rows(robot: &Robot, pipeline: &Pipeline, trajectory: &Trajectory) {
     let library = LibrarySettings {
         generic: Some(true),
         families: Family::JOINT.to_vec(),
         coulomb_velocity: 0.02,
         ..LibrarySettings::default()
     };
-    let library = Library::propose(&robot, &library).expect("terms").0;
+    let library = Library::propose(robot, &library).expect("terms").0;
     for (stage, signal) in [
         ("rows/filtered", RowSignal::Filtered),
         ("rows/raw", RowSignal::Raw),
@@ -116,10 +125,10 @@ fn main() {
         let (seconds, rows) = shortest(|| {
             let mut rows = 0;
             visit_rows(
-                &robot,
+                robot,
                 &library,
-                &pipeline,
-                &trajectory,
+                pipeline,
+                trajectory,
                 signal,
                 &mut |block| {
                     rows += block.len;

@@ -83,18 +83,7 @@ fn arm(size: usize) -> Problem {
         .flat_map(|(c, &len)| std::iter::repeat_n(c, len))
         .collect();
     // x_payload = x_last + 0.1 · noise: columns 0..10 and 70..80.
-    let mix = |gram: &[f64], from: usize, to: usize| -> Vec<f64> {
-        let mut out = gram.to_vec();
-        for i in 0..110 {
-            out[i * 110 + to] = gram[i * 110 + from] + 0.1 * gram[i * 110 + to];
-        }
-        let half = out.clone();
-        for j in 0..110 {
-            out[to * 110 + j] = half[from * 110 + j] + 0.1 * half[to * 110 + j];
-        }
-        out
-    };
-    let gram = (0..10).fold(base.gram, |gram, k| mix(&gram, 70 + k, k));
+    let gram = (0..10).fold(base.gram, |gram, k| nearly_repeated(&gram, 70 + k, k));
     let mut noise = base.xy.clone();
     (0..10).for_each(|k| noise[k] = noise[70 + k] + 0.1 * noise[k]);
     let beta: Vec<f64> = component
@@ -142,8 +131,21 @@ fn arm(size: usize) -> Problem {
     }
 }
 
+/// The Gram of 110 columns behind `x_to ← x_from + 0.1 · x_to`.
+fn nearly_repeated(gram: &[f64], from: usize, to: usize) -> Vec<f64> {
+    let mut out = gram.to_vec();
+    for i in 0..110 {
+        out[i * 110 + to] = gram[i * 110 + from] + 0.1 * gram[i * 110 + to];
+    }
+    let half = out.clone();
+    for j in 0..110 {
+        out[to * 110 + j] = half[from * 110 + j] + 0.1 * half[to * 110 + j];
+    }
+    out
+}
+
 /// The rows about components.
-fn components(settings: impl Fn(Choice, usize) -> InferenceSettings) {
+fn components() {
     let problem = arm(45);
     let (seconds, exact) = least(3, || {
         infer(&problem, &settings(Choice::Auto, 5000)).expect("auto")
@@ -181,7 +183,7 @@ fn components(settings: impl Fn(Choice, usize) -> InferenceSettings) {
 }
 
 /// How far the worst of 200 probabilities is off after half a second on one core, beside chains forty times as long from another seed.
-fn worst_errors(settings: fn(Choice, usize) -> InferenceSettings) {
+fn worst_errors() {
     const SECONDS: f64 = 0.5;
     for (correlation, effect) in [(0.5, 0.3), (0.9, 0.3), (0.9, 1.0)] {
         let problem = problem(200, correlation, effect);
@@ -217,14 +219,28 @@ fn main() {
         .num_threads(1)
         .build()
         .expect("one thread");
-    let settings = |method, draws| InferenceSettings {
+    println!("{:<44} {:>10}", "one core, CPU time", "seconds");
+    pool.install(enumeration);
+    pool.install(gibbs_scans);
+    pool.install(worst_errors);
+    pool.install(judged_chains);
+    pool.install(rows_to_probabilities);
+    pool.install(components);
+    peers();
+}
+
+fn settings(method: Choice, draws: usize) -> InferenceSettings {
+    InferenceSettings {
         method,
         chains: 4,
         draws,
         seed: 1,
         allow_disagreement: true,
-    };
-    println!("{:<44} {:>10}", "one core, CPU time", "seconds");
+    }
+}
+
+/// Time of exact enumeration with slabs and effects of several sizes.
+fn enumeration() {
     for (size, slab, effect) in [
         (20, 1e-4, 0.05),
         (24, 1e-4, 0.05),
@@ -235,10 +251,8 @@ fn main() {
         let mut problem = problem(size, 0.5, effect);
         // So narrow a slab costs nobody anything: every model counts and is visited.
         problem.prior.slab.fill(slab);
-        let (seconds, _) = pool.install(|| {
-            least(7, || {
-                infer(&problem, &settings(Choice::Exact, 0)).expect("exact")
-            })
+        let (seconds, _) = least(7, || {
+            infer(&problem, &settings(Choice::Exact, 0)).expect("exact")
         });
         let each = seconds * 1e9 / (1u64 << size) as f64;
         let what = match (slab < 1.0, effect < 0.5) {
@@ -251,7 +265,10 @@ fn main() {
             format!("exact/2^{size}/{what}")
         );
     }
-    // The narrower the slab, the more effects are undecided and the more flips a scan has.
+}
+
+/// Speed of scans: the narrower the slab, the more effects are undecided and the more flips a scan has.
+fn gibbs_scans() {
     for (size, scans, correlation, effect, slab) in [
         (24, 400_000, 0.5, 1.0, 100.0),
         (24, 400_000, 0.9, 1.0, 100.0),
@@ -266,8 +283,7 @@ fn main() {
     ] {
         let mut problem = problem(size, correlation, effect);
         problem.prior.slab.fill(slab);
-        let (seconds, flips) =
-            pool.install(|| least(5, || scan(&problem, scans, 1).expect("scans")));
+        let (seconds, flips) = least(5, || scan(&problem, scans, 1).expect("scans"));
         let (rate, flips) = (scans as f64 / seconds, 2.0 * flips as f64 / scans as f64);
         let name = format!("gibbs/{size} columns/{correlation}/effect {effect}/slab {slab}");
         println!(
@@ -275,12 +291,13 @@ fn main() {
             rate * 1e-6
         );
     }
-    pool.install(|| worst_errors(settings));
+}
+
+/// Time of a whole sampled answer with its own checks.
+fn judged_chains() {
     let problem = problem(24, 0.5, 1.0);
-    let (seconds, posterior) = pool.install(|| {
-        least(3, || {
-            infer(&problem, &settings(Choice::Gibbs, 5000)).expect("gibbs")
-        })
+    let (seconds, posterior) = least(3, || {
+        infer(&problem, &settings(Choice::Gibbs, 5000)).expect("gibbs")
     });
     if let Method::Gibbs { ess, r_hat, .. } = posterior.method {
         println!(
@@ -288,17 +305,24 @@ fn main() {
             "gibbs/24 columns/4 chains of 5000, judged"
         );
     }
+}
+
+/// Time from rows of white noise to an answer.
+fn rows_to_probabilities() {
     let (columns, y) = rows(32, 20_000, 0.5, 1.0);
     let from_rows = || {
         let problem = question(32, &columns, &y);
         infer(&problem, &settings(Choice::Auto, 5000)).expect("an answer")
     };
-    let (seconds, _) = pool.install(|| least(5, from_rows));
+    let (seconds, _) = least(5, from_rows);
     println!(
         "{:<44} {seconds:>10.6} to probabilities and intervals",
         "20 000 rows of 32 columns, white noise"
     );
-    pool.install(|| components(settings));
+}
+
+/// Times of what people use today, measured by a program in Python.
+fn peers() {
     let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
     match Command::new(format!("{root}/.venv/bin/python"))
         .arg(format!("{root}/benches/peers/inference.py"))

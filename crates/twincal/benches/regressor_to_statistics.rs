@@ -115,6 +115,46 @@ fn measured(way: Way, library: &Library, motion: &[Block], peak: f64) {
         "\n{way:?}: Panda, {} columns; signals of one joint with its torque: {widths:?}; {needed:.0} operations per row",
         library.columns().len()
     );
+    let Seconds {
+        evaluation,
+        gram,
+        cached,
+        both,
+    } = seconds(way, library, motion);
+    println!(
+        "{:<25} {:>8.3} M samples/s",
+        "signals alone",
+        1e-6 / evaluation
+    );
+    for (what, gram) in [("alone ", gram), ("cached", cached)] {
+        println!(
+            "Gram and differences {what} {:>5.3} M rows/s, {:.1} GFLOP/s, {:.0} % of the peak",
+            1e-6 / gram,
+            1e-9 * needed / gram,
+            100.0 * needed / gram / peak
+        );
+    }
+    println!("motion to statistics      {:>8.3} M samples/s", 1e-6 / both);
+    println!(
+        "the peak would allow      {:>8.3} M rows/s for the Gram",
+        1e-6 * peak / needed
+    );
+}
+
+/// Least seconds per sample of each step.
+struct Seconds {
+    /// Motion to signals.
+    evaluation: f64,
+    /// Signals to sums, of all blocks of a run.
+    gram: f64,
+    /// Signals to sums, of the same block over and over.
+    cached: f64,
+    /// Motion to sums.
+    both: f64,
+}
+
+/// Runs every step of one way.
+fn seconds(way: Way, library: &Library, motion: &[Block]) -> Seconds {
     let blocks: Vec<Vec<Aligned>> = (motion.iter())
         .map(|block| {
             let mut out = vec![Aligned::default(); library.joints()];
@@ -157,24 +197,12 @@ fn measured(way: Way, library: &Library, motion: &[Block], peak: f64) {
         }
         finish(statistics)
     });
-    println!(
-        "{:<25} {:>8.3} M samples/s",
-        "signals alone",
-        1e-6 / evaluation
-    );
-    for (what, gram) in [("alone ", gram), ("cached", cached)] {
-        println!(
-            "Gram and differences {what} {:>5.3} M rows/s, {:.1} GFLOP/s, {:.0} % of the peak",
-            1e-6 / gram,
-            1e-9 * needed / gram,
-            100.0 * needed / gram / peak
-        );
+    Seconds {
+        evaluation,
+        gram,
+        cached,
+        both,
     }
-    println!("motion to statistics      {:>8.3} M samples/s", 1e-6 / both);
-    println!(
-        "the peak would allow      {:>8.3} M rows/s for the Gram",
-        1e-6 * peak / needed
-    );
 }
 
 fn panda() -> Robot {

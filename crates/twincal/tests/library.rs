@@ -109,19 +109,51 @@ fn torque_of_arrays_is_that_of_a_log_and_of_the_program() {
     let study = study();
     let fit = study.fit();
     let (twin, log) = (&fit.twin, &study.heldout);
-    let count = log.time.len();
-    let states = |of: &dyn Fn(usize, usize) -> f64| -> Vec<f64> {
-        (0..count)
-            .flat_map(|row| [of(0, row), of(1, row)])
+    let [q, qd, qdd] = states(log);
+    let torque = twin.torque(&q, &qd, &qdd).expect("torque");
+    compare_rows(twin, log, &torque);
+    let program = Evaluator::new(twin, None).expect("a program");
+    for row in (0..log.time.len()).step_by(97) {
+        let own = 2 * row..2 * row + 2;
+        let (mean, _) = program.evaluate(&q[own.clone()], &qd[own.clone()], &qdd[own.clone()]);
+        for (found, mean) in torque.mean[own].iter().zip(&mean) {
+            assert!((found - mean).abs() < 1e-9, "{found} {mean}");
+        }
+    }
+    // One state by itself, and none.
+    let one = twin.torque(&q[..2], &qd[..2], &qdd[..2]).expect("torque");
+    assert_eq!(one.low, torque.low[..2]);
+    assert!(twin.torque(&[], &[], &[]).expect("torque").mean.is_empty());
+    let unknown = twin.torque(&[0.1, f64::NAN], &[0.0; 2], &[0.0; 2]);
+    let said = unknown.expect_err("not a number").to_string();
+    assert!(
+        said.starts_with("setting `q`: NaN for joint 2 of state 0"),
+        "{said}"
+    );
+    for wrong in [&q[..3], &q[..4]] {
+        let error = twin
+            .torque(&q[..2], wrong, &qdd[..2])
+            .expect_err("other lengths");
+        assert!(error.to_string().starts_with("setting `qd`"), "{error}");
+    }
+}
+
+/// Positions, velocities and accelerations of a log of two joints, `2 * row + joint`.
+fn states(log: &Recording) -> [Vec<f64>; 3] {
+    let channel = |pick: fn(&twincal::signal::Channels) -> &[f64]| -> Vec<f64> {
+        (0..log.time.len())
+            .flat_map(|row| [0, 1].map(|joint| pick(&log.joints[joint])[row]))
             .collect()
     };
-    let channel = |pick: fn(&twincal::signal::Channels) -> &[f64]| {
-        states(&|joint, row| pick(&log.joints[joint])[row])
-    };
-    let q = channel(|own| &own.q);
-    let qd = channel(|own| own.qd.as_deref().expect("velocity"));
-    let qdd = channel(|own| own.qdd.as_deref().expect("acceleration"));
-    let torque = twin.torque(&q, &qd, &qdd).expect("torque");
+    [
+        channel(|own| &own.q),
+        channel(|own| own.qd.as_deref().expect("velocity")),
+        channel(|own| own.qdd.as_deref().expect("acceleration")),
+    ]
+}
+
+/// Torque of the [`states`] of a log is the prediction of its rows.
+fn compare_rows(twin: &Twin, log: &Recording, torque: &Torque) {
     let library = twin.library().expect("a library");
     let predictor = twin.predictor(&library).expect("a predictor");
     let (trajectory, _) = twin.align(log).expect("a trajectory");
@@ -154,30 +186,6 @@ fn torque_of_arrays_is_that_of_a_log_and_of_the_program() {
     )
     .expect("rows");
     assert!(rows > 3000, "{rows}");
-    let program = Evaluator::new(twin, None).expect("a program");
-    for row in (0..count).step_by(97) {
-        let own = 2 * row..2 * row + 2;
-        let (mean, _) = program.evaluate(&q[own.clone()], &qd[own.clone()], &qdd[own.clone()]);
-        for (found, mean) in torque.mean[own].iter().zip(&mean) {
-            assert!((found - mean).abs() < 1e-9, "{found} {mean}");
-        }
-    }
-    // One state by itself, and none.
-    let one = twin.torque(&q[..2], &qd[..2], &qdd[..2]).expect("torque");
-    assert_eq!(one.low, torque.low[..2]);
-    assert!(twin.torque(&[], &[], &[]).expect("torque").mean.is_empty());
-    let unknown = twin.torque(&[0.1, f64::NAN], &[0.0; 2], &[0.0; 2]);
-    let said = unknown.expect_err("not a number").to_string();
-    assert!(
-        said.starts_with("setting `q`: NaN for joint 2 of state 0"),
-        "{said}"
-    );
-    for wrong in [&q[..3], &q[..4]] {
-        let error = twin
-            .torque(&q[..2], wrong, &qdd[..2])
-            .expect_err("other lengths");
-        assert!(error.to_string().starts_with("setting `qd`"), "{error}");
-    }
 }
 
 /// Truth: the program that is exported, which carries what was found as well.

@@ -296,19 +296,32 @@ fn a_robot_survives_its_file() {
     );
 }
 
+/// A state of four joints.
+const STATE: [[f64; 4]; 3] = [
+    [0.1, 0.2, 0.3, 0.4],
+    [1.0, -2.0, 0.5, 3.0],
+    [4.0, 5.0, -6.0, 1.0],
+];
+
+#[track_caller]
+fn close(tau: &[f64], expected: &[f64]) {
+    for (a, b) in tau.iter().zip(expected) {
+        assert!(
+            (a - b).abs() < 1e-12 * b.abs().max(1.0),
+            "{tau:?} {expected:?}"
+        );
+    }
+}
+
 #[test]
-fn locking_and_mimicking_are_what_they_say() {
+fn locking_is_what_it_says() {
     let description: RobotDescription =
         serde_json::from_value(golden()[0]["description"].clone()).unwrap();
     let full = build(description.clone());
     let locked = BTreeMap::from([("joint2".to_string(), 0.8), ("joint4".to_string(), -0.3)]);
-    let (part, _) = Robot::new(description.clone(), &locked).unwrap();
+    let (part, _) = Robot::new(description, &locked).unwrap();
     assert_eq!(part.joint_names(), ["joint0", "joint1", "joint3", "joint5"]);
-    let (q, qd, qdd) = (
-        [0.1, 0.2, 0.3, 0.4],
-        [1.0, -2.0, 0.5, 3.0],
-        [4.0, 5.0, -6.0, 1.0],
-    );
+    let [q, qd, qdd] = STATE;
     let spread = |v: [f64; 4], a: f64, b: f64| [v[0], v[1], a, v[2], b, v[3]];
     let whole = torque(
         &full,
@@ -317,13 +330,15 @@ fn locking_and_mimicking_are_what_they_say() {
         &spread(qdd, 0.0, 0.0),
     );
     let tau = torque(&part, &q, &qd, &qdd);
-    for (a, b) in tau.iter().zip([whole[0], whole[1], whole[3], whole[5]]) {
-        assert!(
-            (a - b).abs() < 1e-12 * b.abs().max(1.0),
-            "{tau:?} {whole:?}"
-        );
-    }
-    // A chain of mimics: joint5 = 2 (−0.5 joint1 + 0.1) + 0.3.
+    close(&tau, &[whole[0], whole[1], whole[3], whole[5]]);
+}
+
+/// A chain of mimics: joint5 = 2 (−0.5 joint1 + 0.1) + 0.3.
+#[test]
+fn mimicking_is_what_it_says() {
+    let description: RobotDescription =
+        serde_json::from_value(golden()[0]["description"].clone()).unwrap();
+    let full = build(description.clone());
     let mut chained = description;
     chained.joints[3].mimic = Some(Mimic {
         joint: "joint1".into(),
@@ -336,11 +351,7 @@ fn locking_and_mimicking_are_what_they_say() {
         offset: 0.3,
     });
     let robot = build(chained);
-    let (q, qd, qdd) = (
-        [0.1, 0.2, 0.3, 0.4],
-        [1.0, -2.0, 0.5, 3.0],
-        [4.0, 5.0, -6.0, 1.0],
-    );
+    let [q, qd, qdd] = STATE;
     let spread =
         |v: [f64; 4], o: [f64; 2]| [v[0], v[1], v[2], -0.5 * v[1] + o[0], v[3], -v[1] + o[1]];
     let whole = torque(
@@ -350,17 +361,8 @@ fn locking_and_mimicking_are_what_they_say() {
         &spread(qdd, [0.0; 2]),
     );
     let tau = torque(&robot, &q, &qd, &qdd);
-    for (a, b) in tau.iter().zip([
-        whole[0],
-        whole[1] - 0.5 * whole[3] - whole[5],
-        whole[2],
-        whole[4],
-    ]) {
-        assert!(
-            (a - b).abs() < 1e-12 * b.abs().max(1.0),
-            "{tau:?} {whole:?}"
-        );
-    }
+    let second = whole[1] - 0.5 * whole[3] - whole[5];
+    close(&tau, &[whole[0], second, whole[2], whole[4]]);
 }
 
 proptest! {

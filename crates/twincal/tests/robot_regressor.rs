@@ -224,29 +224,24 @@ fn the_position_derivative_is_the_difference_of_torques() {
     }
 }
 
+/// Columns of the kinetic and of the potential energy of one state: q, q̇, q̈.
+fn energy_columns(robot: &Robot, [q, qd, qdd]: [&[f64]; 3]) -> [Vec<f64>; 2] {
+    let size = 10 * robot.bodies().len() * STRIDE;
+    let mut workspace = BlockWorkspace::new(robot);
+    let mut out = [vec![f64::NAN; size], vec![f64::NAN; size]];
+    let [kinetic, potential] = &mut out;
+    let motion = Motion { len: 1, q, qd, qdd };
+    energy_regressor(robot, &mut workspace, motion, 0..1, kinetic, potential);
+    out.map(|v| v.into_iter().step_by(STRIDE).collect())
+}
+
 #[test]
-fn the_energy_regressor_gives_the_energies_and_its_euler_lagrange_image_is_the_regressor() {
+fn the_energy_regressor_gives_the_energies() {
     for robot in robots() {
-        let (n, bodies) = (robot.dof(), robot.bodies().len());
         let [q, qd, qdd] = &motion(&robot, 1);
-        let regressor = Regressor::new(&robot);
-        let mut block = regressor.block(&robot);
-        let at = Motion { len: 1, q, qd, qdd };
-        regressor.evaluate(&robot, at, 0..1, &mut block);
-        let energies = |q: &[f64], qd: &[f64]| {
-            let mut workspace = BlockWorkspace::new(&robot);
-            let mut out = [
-                vec![f64::NAN; 10 * bodies * STRIDE],
-                vec![f64::NAN; 10 * bodies * STRIDE],
-            ];
-            let [kinetic, potential] = &mut out;
-            let motion = Motion { len: 1, q, qd, qdd };
-            energy_regressor(&robot, &mut workspace, motion, 0..1, kinetic, potential);
-            out.map(|v| v.into_iter().step_by(STRIDE).collect::<Vec<f64>>())
-        };
-        let [kinetic, potential] = energies(q, qd);
+        let [kinetic, potential] = energy_columns(&robot, [q, qd, qdd]);
         let total = |columns: &[f64]| -> f64 {
-            (0..bodies)
+            (0..robot.bodies().len())
                 .flat_map(|b| robot.parameters_of_body(b))
                 .zip(columns)
                 .map(|(p, c)| p * c)
@@ -255,10 +250,21 @@ fn the_energy_regressor_gives_the_energies_and_its_euler_lagrange_image_is_the_r
         assert!((total(&kinetic) / kinetic_energy(&robot, q, qd) - 1.0).abs() < 1e-13);
         let expected = potential_energy(&robot, q);
         assert!((total(&potential) - expected).abs() < 1e-12 * (1.0 + expected.abs()));
+    }
+}
 
-        // d/dt ∂L/∂q̇ − ∂L/∂q along q + q̇ t + ½ q̈ t²
+/// d/dt ∂L/∂q̇ − ∂L/∂q along q + q̇ t + ½ q̈ t².
+#[test]
+fn the_euler_lagrange_image_of_the_energy_regressor_is_the_regressor() {
+    for robot in robots() {
+        let n = robot.dof();
+        let [q, qd, qdd] = &motion(&robot, 1);
+        let regressor = Regressor::new(&robot);
+        let mut block = regressor.block(&robot);
+        let at = Motion { len: 1, q, qd, qdd };
+        regressor.evaluate(&robot, at, 0..1, &mut block);
         let lagrangian = |q: &[f64], qd: &[f64], column: usize| {
-            let [kinetic, potential] = energies(q, qd);
+            let [kinetic, potential] = energy_columns(&robot, [q, qd, qdd]);
             kinetic[column] - potential[column]
         };
         for (p, pair) in regressor.pairs().iter().enumerate() {

@@ -26,6 +26,7 @@ mod robot_dynamics;
 mod robot_regressor;
 mod robot_rules;
 mod robust;
+mod size;
 mod statistics;
 mod statuses;
 mod suites;

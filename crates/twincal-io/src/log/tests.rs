@@ -389,22 +389,7 @@ fn damage_is_read_in_chapters_as_in_memory() {
     for (ending, good) in &files {
         let path = folder.path().join(format!("run.{ending}"));
         for case in 0..40 {
-            let rng = runner.rng();
-            let mut bytes = good.clone();
-            for _ in 0..rng.random_range(1..6) {
-                let at = rng.random_range(0..bytes.len());
-                bytes[at] = rng.random();
-            }
-            let at = rng.random_range(0..bytes.len());
-            match case % 8 {
-                0 => bytes.truncate(at),
-                1 => {
-                    let part = bytes[at..bytes.len().min(at + 5000)].to_vec();
-                    bytes.splice(at..at, part);
-                }
-                _ => {}
-            }
-            std::fs::write(&path, &bytes).unwrap();
+            std::fs::write(&path, damaged(good, case, runner.rng())).unwrap();
             for lenient in [false, true] {
                 let options = LogOptions {
                     lenient,
@@ -438,4 +423,23 @@ fn damage_is_read_in_chapters_as_in_memory() {
         }
     }
     assert!(read > 60 && long > 50, "{read} read, {long} in chapters");
+}
+
+/// One to five changed bytes; every eighth file is cut, every eighth has a part twice.
+fn damaged(good: &[u8], case: usize, rng: &mut TestRng) -> Vec<u8> {
+    let mut bytes = good.to_vec();
+    for _ in 0..rng.random_range(1..6) {
+        let at = rng.random_range(0..bytes.len());
+        bytes[at] = rng.random();
+    }
+    let at = rng.random_range(0..bytes.len());
+    match case % 8 {
+        0 => bytes.truncate(at),
+        1 => {
+            let part = bytes[at..bytes.len().min(at + 5000)].to_vec();
+            bytes.splice(at..at, part);
+        }
+        _ => {}
+    }
+    bytes
 }

@@ -2,7 +2,7 @@
 
 use super::{fixture, render, script};
 use crate::context::{FileHash, ReportContext};
-use quick_xml::events::Event;
+use quick_xml::events::{BytesRef, Event};
 use twincal::calibrate::Calibration;
 
 fn context() -> ReportContext {
@@ -54,6 +54,11 @@ struct Parsed {
     drawn: Vec<String>,
 }
 
+/// Elements whose end ends a line of text.
+const ENDS_A_LINE: [&str; 14] = [
+    "p", "li", "h1", "h2", "h3", "th", "td", "dt", "dd", "summary", "tr", "a", "span", "title",
+];
+
 fn parse(html: &str) -> Parsed {
     let html = without_script(html);
     let body = html
@@ -87,12 +92,7 @@ fn parse(html: &str) -> Parsed {
             }
             Event::End(_) => {
                 let closed = open.pop().unwrap();
-                if [
-                    "p", "li", "h1", "h2", "h3", "th", "td", "dt", "dd", "summary", "tr", "a",
-                    "span", "title",
-                ]
-                .contains(&closed.as_str())
-                {
+                if ENDS_A_LINE.contains(&closed.as_str()) {
                     parsed.text.push('\n');
                 }
             }
@@ -107,13 +107,7 @@ fn parse(html: &str) -> Parsed {
                 }
             }
             Event::GeneralRef(reference) => {
-                let shown = match &*reference {
-                    "lt" => "<".into(),
-                    "gt" => ">".into(),
-                    "amp" => "&".into(),
-                    "quot" => "\"".into(),
-                    _ => reference.resolve_char_ref().unwrap().unwrap().to_string(),
-                };
+                let shown = referenced(&reference);
                 if !open.iter().any(|o| o == "svg") {
                     parsed.text.push_str(&shown);
                 }
@@ -124,6 +118,17 @@ fn parse(html: &str) -> Parsed {
     }
     assert!(open.is_empty(), "unclosed: {open:?}");
     parsed
+}
+
+/// What an entity or a character reference shows.
+fn referenced(reference: &BytesRef<'_>) -> String {
+    match &**reference {
+        "lt" => "<".into(),
+        "gt" => ">".into(),
+        "amp" => "&".into(),
+        "quot" => "\"".into(),
+        _ => reference.resolve_char_ref().unwrap().unwrap().to_string(),
+    }
 }
 
 #[test]

@@ -196,21 +196,27 @@ fn time_is_the_field_that_is_asked_in_the_unit_that_is_said() {
     );
 }
 
+/// Every text of `[columns]` is refused with its words.
+#[track_caller]
+fn are_refused(cases: &[(&str, &[&str])]) {
+    for (text, words) in cases {
+        contains(
+            &refused(read_with(&fixture("mapped.mcap"), &columns(text))),
+            words,
+        );
+    }
+}
+
 #[test]
 fn wrong_paths_are_told_with_what_is_there() {
-    let none = "q = { elbow = \"/arm/state:q[0]\" }";
-    for (text, words) in [
+    are_refused(&[
         (
             "q = \"/arm/stat:q[*]\"",
             &[
                 "no topic `/arm/stat`, which [columns] q names",
                 "`/arm/state` (my_msgs/msg/ArmState, cdr, 60 messages)",
                 "did you mean `/arm/state`?",
-            ][..],
-        ),
-        (
-            "q = \"/arm/state:q[*]\"\ntemperature = \"/arm/state:T[*]\"",
-            &["[columns] temperature", "from tables only"],
+            ],
         ),
         (
             "q = \"/arm/state:p[*]\"",
@@ -246,6 +252,28 @@ fn wrong_paths_are_told_with_what_is_there() {
             &["`joints` has no entry called `wrist`", "`elbow`"],
         ),
         (
+            "q = \"positions\"",
+            &["names no topic of a bag", "q = \"/topic:field[*]\""],
+        ),
+        (
+            "q = \"/arm/state:q[*]\"\ntime = \"/raw:seconds\"",
+            &["time names topic `/raw`, and no channel"],
+        ),
+        (
+            "q = \"/arm/state:q[*]\"\ntime = \"/arm/state:mode\"",
+            &["`mode` is string"],
+        ),
+    ]);
+}
+
+#[test]
+fn maps_that_do_not_fit_the_joints_are_refused() {
+    are_refused(&[
+        (
+            "q = \"/arm/state:q[*]\"\ntemperature = \"/arm/state:T[*]\"",
+            &["[columns] temperature", "from tables only"],
+        ),
+        (
             "q = \"/arm/state:codes[*]\"",
             &["`codes` has 3 entries, the model has 2 moving joints"],
         ),
@@ -258,32 +286,18 @@ fn wrong_paths_are_told_with_what_is_there() {
             &["[*], which stands for every joint"],
         ),
         (
-            "q = \"positions\"",
-            &["names no topic of a bag", "q = \"/topic:field[*]\""],
-        ),
-        (
-            "q = \"/arm/state:q[*]\"\ntime = \"/raw:seconds\"",
-            &["time names topic `/raw`, and no channel"],
-        ),
-        (
-            "q = \"/arm/state:q[*]\"\ntime = \"/arm/state:mode\"",
-            &["`mode` is string"],
-        ),
-        (
             "q = \"/arm/state:q[*]\"",
             &["[columns] maps no torque", "torque = \"none\""],
         ),
         (
-            none,
+            "q = { elbow = \"/arm/state:q[0]\" }",
             &["maps no position of joint `shoulder`", "no joint states"],
         ),
-    ] {
-        contains(
-            &refused(read_with(&fixture("mapped.mcap"), &columns(text))),
-            words,
-        );
-    }
-    // left out and counted when told to be lenient
+    ]);
+}
+
+#[test]
+fn messages_without_the_entry_are_left_out_and_counted_when_lenient() {
     let mut lenient = columns("q = { elbow = \"/raw:counts[1]\", shoulder = \"/raw:q[0]\" }");
     lenient.lenient = true;
     lenient.torque.source = Some(TorqueSource::None);

@@ -69,9 +69,8 @@ fn case_79_large_files() {
 }
 
 #[test]
-fn case_80_meshes_are_never_opened_and_includes_stay_inside() {
-    let outer = TempDir::new().unwrap();
-    let folder = TempDir::new_in(outer.path()).unwrap();
+fn case_80_meshes_are_never_opened() {
+    let folder = TempDir::new().unwrap();
     let mesh = trap(&folder, "mesh.stl");
     for name in [
         mesh.display().to_string(),
@@ -86,26 +85,33 @@ fn case_80_meshes_are_never_opened_and_includes_stay_inside() {
         let path = write(&folder, "arm.xml", &text);
         returns(move || read(&path)).unwrap();
     }
+}
 
-    let part = "<mujoco><worldbody><body><inertial pos='0 0 1' mass='1' diaginertia='1 1 1'/><joint name='in'/></body></worldbody></mujoco>";
-    write(&outer, "outside.xml", part);
-    std::fs::create_dir(folder.path().join("parts")).unwrap();
-    write(&folder, "parts/inside.xml", part);
+/// What a model includes.
+const PART: &str = "<mujoco><worldbody><body><inertial pos='0 0 1' mass='1' diaginertia='1 1 1'/><joint name='in'/></body></worldbody></mujoco>";
+
+/// Writes a model that includes this file.
+fn include(folder: &TempDir, file: &str) -> PathBuf {
+    write(
+        folder,
+        "main.xml",
+        &MJCF.replace(
+            "<worldbody>",
+            &format!("<include file=\"{file}\"/>\n<worldbody>"),
+        ),
+    )
+}
+
+#[test]
+fn case_80_includes_stay_inside() {
+    let outer = TempDir::new().unwrap();
+    let folder = TempDir::new_in(outer.path()).unwrap();
+    write(&outer, "outside.xml", PART);
     std::os::unix::fs::symlink(
         outer.path().join("outside.xml"),
         folder.path().join("link.xml"),
     )
     .unwrap();
-    let include = |file: &str| {
-        write(
-            &folder,
-            "main.xml",
-            &MJCF.replace(
-                "<worldbody>",
-                &format!("<include file=\"{file}\"/>\n<worldbody>"),
-            ),
-        )
-    };
     for bad in [
         "../outside.xml",
         "link.xml",
@@ -113,10 +119,18 @@ fn case_80_meshes_are_never_opened_and_includes_stay_inside() {
         &outer.path().join("outside.xml").display().to_string(),
     ] {
         says(
-            &read(&include(bad)).unwrap_err(),
+            &read(&include(&folder, bad)).unwrap_err(),
             &["main.xml:4:", "outside the model's folder"],
         );
     }
+}
+
+#[test]
+fn case_80_what_is_included_is_a_file() {
+    let folder = TempDir::new().unwrap();
+    std::fs::create_dir(folder.path().join("parts")).unwrap();
+    write(&folder, "parts/inside.xml", PART);
+    let include = |file: &str| include(&folder, file);
     says(
         &read(&include("parts/none.xml")).unwrap_err(),
         &["main.xml:4:", "cannot include"],
@@ -131,6 +145,7 @@ fn case_80_meshes_are_never_opened_and_includes_stay_inside() {
         3
     );
     // A pipe inside the folder is not a file either.
+    trap(&folder, "mesh.stl");
     let path = include("mesh.stl");
     says(&returns(move || read(&path)).unwrap_err(), &["not a file"]);
     // From memory there is no folder.
@@ -146,7 +161,7 @@ fn case_80_meshes_are_never_opened_and_includes_stay_inside() {
     write(
         &folder,
         "parts/inside.xml",
-        &part.replace("mass='1'", "mass='x'"),
+        &PART.replace("mass='1'", "mass='x'"),
     );
     says(
         &read(&include("parts/inside.xml")).unwrap_err(),
@@ -154,10 +169,10 @@ fn case_80_meshes_are_never_opened_and_includes_stay_inside() {
     );
 }
 
+/// Ten files, each including the next twenty times: 20^10 in all.
 #[test]
 fn case_81_include_bombs() {
     let folder = TempDir::new().unwrap();
-    // Ten files, each including the next twenty times: 20^10 in all.
     for i in 0..10 {
         let body = if i == 9 {
             "<worldbody/>".into()
@@ -180,7 +195,12 @@ fn case_81_include_bombs() {
         "{:?}",
         start.elapsed()
     );
-    // Few files, many bytes: refused by their size before they are read.
+}
+
+/// Few files, many bytes: refused by their size before they are read.
+#[test]
+fn case_81_large_includes() {
+    let folder = TempDir::new().unwrap();
     let big = folder.path().join("big.xml");
     std::fs::File::create(&big)
         .unwrap()
@@ -194,7 +214,11 @@ fn case_81_include_bombs() {
         &read(&write(&folder, "main.xml", &small)).unwrap_err(),
         &["big.xml", "32 MiB"],
     );
-    // Cycles and long chains.
+}
+
+#[test]
+fn case_81_cycles_and_long_chains() {
+    let folder = TempDir::new().unwrap();
     let ring = write(
         &folder,
         "ring.xml",

@@ -119,15 +119,7 @@ fn the_variance_in_coordinates_is_that_in_columns() {
     };
     let (library, _) = Library::propose(&robot, &settings).unwrap();
     let count = library.columns().len();
-    let covariance: Vec<f64> = (0..count * count)
-        .map(|k| {
-            let (a, b) = (k / count, k % count);
-            let tied: f64 = (0..3)
-                .map(|f| (((a + 1) * (f + 2)) as f64).sin() * (((b + 1) * (f + 2)) as f64).sin())
-                .sum();
-            tied + if a == b { 0.1 } else { 0.0 }
-        })
-        .collect();
+    let covariance = tied(count);
     let coordinates = Coordinates::new(&robot, &library, &covariance);
     let inertial = coordinates
         .all
@@ -152,28 +144,43 @@ fn the_variance_in_coordinates_is_that_in_columns() {
         let all = values(&t.steps, &q, &qd, &qdd);
         for joint in 0..robot.dof() {
             let own = library.columns_of_joint(joint);
-            let mut expected = 0.0;
-            for (i, a) in own.iter().enumerate() {
-                for (k, b) in own.iter().enumerate() {
-                    expected += out[joint][i] * covariance[a * count + b] * out[joint][k];
-                }
-            }
+            let between = |i: usize, k: usize| covariance[own[i] * count + own[k]];
+            let expected = quadratic_form(&out[joint][..own.len()], &between);
             let z: Vec<f64> = (steps.iter())
                 .map(|steps| {
                     let step = steps.iter().find(|(j, _)| *j == joint);
                     step.map_or(0.0, |(_, x)| all[*x as usize])
                 })
                 .collect();
-            let mut variance = 0.0;
-            for (a, x) in z.iter().enumerate() {
-                for (b, y) in z.iter().enumerate() {
-                    variance += x * coordinates.covariance(a, b) * y;
-                }
-            }
+            let variance = quadratic_form(&z, &|a, b| coordinates.covariance(a, b));
             assert!(
                 (variance - expected).abs() < 1e-9 * expected,
                 "joint {joint}: {variance} {expected}"
             );
         }
     }
+}
+
+/// A covariance of `count` columns, each of them tied to every other.
+fn tied(count: usize) -> Vec<f64> {
+    (0..count * count)
+        .map(|k| {
+            let (a, b) = (k / count, k % count);
+            let tied: f64 = (0..3)
+                .map(|f| (((a + 1) * (f + 2)) as f64).sin() * (((b + 1) * (f + 2)) as f64).sin())
+                .sum();
+            tied + if a == b { 0.1 } else { 0.0 }
+        })
+        .collect()
+}
+
+/// xᵀ C x.
+fn quadratic_form(x: &[f64], covariance: &dyn Fn(usize, usize) -> f64) -> f64 {
+    let mut sum = 0.0;
+    for (a, x_a) in x.iter().enumerate() {
+        for (b, x_b) in x.iter().enumerate() {
+            sum += x_a * covariance(a, b) * x_b;
+        }
+    }
+    sum
 }

@@ -115,22 +115,7 @@ pub(super) fn acting(
         component.rotate_left(half / 2);
     }
     let size = component.len();
-    let columns = |c: usize| -> Vec<usize> { (0..size).filter(|&k| component[k] == c).collect() };
-    let (zero, one) = (columns(0), columns(1));
-    let (mut x, mut y) = (vec![0.0; rows * size], vec![0.0; rows]);
-    for (row, y) in x.chunks_exact_mut(size).zip(&mut y) {
-        let common = normal(&mut rng);
-        for value in row.iter_mut() {
-            *value = 0.5 * common + 0.8 * normal(&mut rng);
-        }
-        for (&a, &b) in zero.iter().zip(&one) {
-            row[b] = row[a] + 0.05 * normal(&mut rng);
-        }
-        *y = 0.5 * normal(&mut rng);
-        for k in (0..size).filter(|&k| component[k].is_multiple_of(3)) {
-            *y += effect * row[k] / (1.0 + component[k] as f64);
-        }
-    }
+    let (x, y) = acting_rows(&mut rng, &component, rows, effect);
     let (mut gram, mut xy) = (vec![0.0; size * size], vec![0.0; size]);
     for (row, y) in x.chunks_exact(size).zip(&y) {
         for i in 0..size {
@@ -160,6 +145,33 @@ pub(super) fn acting(
         names: (0..size).map(|k| format!("x{k}")).collect(),
     };
     Grouped { problem, x, y }
+}
+
+/// Columns, row-major, and y of [`acting`] by the component of each column.
+fn acting_rows(
+    rng: &mut ChaCha8Rng,
+    component: &[usize],
+    rows: usize,
+    effect: f64,
+) -> (Vec<f64>, Vec<f64>) {
+    let size = component.len();
+    let columns = |c: usize| -> Vec<usize> { (0..size).filter(|&k| component[k] == c).collect() };
+    let (zero, one) = (columns(0), columns(1));
+    let (mut x, mut y) = (vec![0.0; rows * size], vec![0.0; rows]);
+    for (row, y) in x.chunks_exact_mut(size).zip(&mut y) {
+        let common = normal(rng);
+        for value in row.iter_mut() {
+            *value = 0.5 * common + 0.8 * normal(rng);
+        }
+        for (&a, &b) in zero.iter().zip(&one) {
+            row[b] = row[a] + 0.05 * normal(rng);
+        }
+        *y = 0.5 * normal(rng);
+        for k in (0..size).filter(|&k| component[k].is_multiple_of(3)) {
+            *y += effect * row[k] / (1.0 + component[k] as f64);
+        }
+    }
+    (x, y)
 }
 
 impl Grouped {
@@ -192,62 +204,15 @@ pub(super) struct Densities {
 
 impl Densities {
     pub(super) fn new(data: &Grouped) -> Self {
-        let (problem, prior) = (&data.problem, &data.problem.prior);
-        let (size, rows, count) = (problem.xy.len(), data.y.len(), prior.components());
-        let shape = prior.shape + 0.5 * rows as f64;
-        let (mut models, mut share) = (Vec::new(), 0.0);
-        let orphan = |set: u32, c: usize| {
-            let parent = prior.parent.get(c).copied().flatten();
-            set >> c & 1 == 1 && parent.is_some_and(|p| set >> p & 1 == 0)
-        };
-        for set in 0u32..1 << count {
-            if (0..count).any(|c| orphan(set, c)) {
-                continue;
-            }
-            let members: Vec<usize> = (0..size)
-                .filter(|&k| set >> prior.component[k] & 1 == 1)
-                .collect();
-            let at = |i: usize, k: usize| data.x[i * size + k];
-            let mut scale = vec![0.0; rows * rows];
-            for i in 0..rows {
-                for j in 0..=i {
-                    let inner: f64 = members
-                        .iter()
-                        .map(|&k| at(i, k) * at(j, k) * prior.slab[k])
-                        .sum();
-                    scale[i * rows + j] = inner + f64::from(i == j);
-                    scale[j * rows + i] = scale[i * rows + j];
-                }
-            }
-            let factor = Cholesky::new(&scale, rows).unwrap();
-            let mut solved = data.y.clone();
-            factor.solve(&mut solved);
-            let square: f64 = data.y.iter().zip(&solved).map(|(a, b)| a * b).sum();
-            let mut families = vec![0; prior.families()];
-            (0..count)
-                .filter(|&c| set >> c & 1 == 1)
-                .for_each(|c| families[prior.family[c]] += 1);
-            share += prior.log_model(&families).exp();
-            let log = prior.log_model(&families) + problem.log_constant + ln_gamma(shape)
-                - ln_gamma(prior.shape)
-                - 0.5 * rows as f64 * (2.0 * std::f64::consts::PI * prior.scale).ln()
-                - 0.5 * factor.log_determinant()
-                - shape * (0.5 * square / prior.scale).ln_1p();
-            let phi = (prior.scale + 0.5 * square) / (shape - 1.0);
-            let (mut mean, mut second) = (vec![0.0; size], vec![0.0; size]);
-            for &k in &members {
-                let column: Vec<f64> = (0..rows).map(|i| at(i, k)).collect();
-                let mut gain = column.clone();
-                factor.solve(&mut gain);
-                let along = |v: &[f64]| -> f64 { gain.iter().zip(v).map(|(a, b)| a * b).sum() };
-                let v = prior.slab[k];
-                mean[k] = v * along(&data.y);
-                second[k] = mean[k] * mean[k] + phi * v * (1.0 - v * along(&column));
-            }
-            models.push((log, set, mean, second));
-        }
-        let top = models.iter().map(|m| m.0).fold(f64::NEG_INFINITY, f64::max);
-        let total: f64 = models.iter().map(|m| (m.0 - top).exp()).sum();
+        let (size, count) = (data.problem.xy.len(), data.problem.prior.components());
+        let sets = 0u32..1 << count;
+        let models: Vec<Density> = sets.filter_map(|set| Density::new(data, set)).collect();
+        let share = models.iter().fold(0.0, |sum, m| sum + m.log_prior.exp());
+        let top = models
+            .iter()
+            .map(|m| m.log)
+            .fold(f64::NEG_INFINITY, f64::max);
+        let total: f64 = models.iter().map(|m| (m.log - top).exp()).sum();
         let mut out = Self {
             log_evidence: top + total.ln() - share.ln(),
             pip: vec![0.0; count],
@@ -255,15 +220,15 @@ impl Densities {
             sd: vec![0.0; size],
             weights: vec![0.0; 1 << count],
         };
-        for (log, set, mean, second) in &models {
-            let weight = (log - top).exp() / total;
-            out.weights[*set as usize] = weight;
+        for model in &models {
+            let weight = (model.log - top).exp() / total;
+            out.weights[model.set as usize] = weight;
             (0..count)
-                .filter(|c| set >> c & 1 == 1)
+                .filter(|c| model.set >> c & 1 == 1)
                 .for_each(|c| out.pip[c] += weight);
             for k in 0..size {
-                out.mean[k] += weight * mean[k];
-                out.sd[k] += weight * second[k];
+                out.mean[k] += weight * model.mean[k];
+                out.sd[k] += weight * model.second[k];
             }
         }
         for k in 0..size {
@@ -271,4 +236,82 @@ impl Densities {
         }
         out
     }
+}
+
+/// One set of components of [`Densities`]: log p(y, z), log p(z), and E[β] and E[β²] by column.
+struct Density {
+    set: u32,
+    log: f64,
+    log_prior: f64,
+    mean: Vec<f64>,
+    second: Vec<f64>,
+}
+
+impl Density {
+    /// None of a set with a child without its parent.
+    fn new(data: &Grouped, set: u32) -> Option<Self> {
+        let (problem, prior) = (&data.problem, &data.problem.prior);
+        let (size, rows, count) = (problem.xy.len(), data.y.len(), prior.components());
+        let shape = prior.shape + 0.5 * rows as f64;
+        let orphan = |c: usize| {
+            let parent = prior.parent.get(c).copied().flatten();
+            set >> c & 1 == 1 && parent.is_some_and(|p| set >> p & 1 == 0)
+        };
+        if (0..count).any(orphan) {
+            return None;
+        }
+        let members: Vec<usize> = (0..size)
+            .filter(|&k| set >> prior.component[k] & 1 == 1)
+            .collect();
+        let factor = Cholesky::new(&scale_matrix(data, &members), rows).unwrap();
+        let mut solved = data.y.clone();
+        factor.solve(&mut solved);
+        let square: f64 = data.y.iter().zip(&solved).map(|(a, b)| a * b).sum();
+        let mut families = vec![0; prior.families()];
+        (0..count)
+            .filter(|&c| set >> c & 1 == 1)
+            .for_each(|c| families[prior.family[c]] += 1);
+        let log_prior = prior.log_model(&families);
+        let log = log_prior + problem.log_constant + ln_gamma(shape)
+            - ln_gamma(prior.shape)
+            - 0.5 * rows as f64 * (2.0 * std::f64::consts::PI * prior.scale).ln()
+            - 0.5 * factor.log_determinant()
+            - shape * (0.5 * square / prior.scale).ln_1p();
+        let phi = (prior.scale + 0.5 * square) / (shape - 1.0);
+        let (mut mean, mut second) = (vec![0.0; size], vec![0.0; size]);
+        for &k in &members {
+            let column: Vec<f64> = (0..rows).map(|i| data.x[i * size + k]).collect();
+            let mut gain = column.clone();
+            factor.solve(&mut gain);
+            let along = |v: &[f64]| -> f64 { gain.iter().zip(v).map(|(a, b)| a * b).sum() };
+            let v = prior.slab[k];
+            mean[k] = v * along(&data.y);
+            second[k] = mean[k] * mean[k] + phi * v * (1.0 - v * along(&column));
+        }
+        Some(Self {
+            set,
+            log,
+            log_prior,
+            mean,
+            second,
+        })
+    }
+}
+
+/// 1 + X_z V_z X_zᵀ of these columns, rows × rows.
+fn scale_matrix(data: &Grouped, members: &[usize]) -> Vec<f64> {
+    let (size, rows) = (data.problem.xy.len(), data.y.len());
+    let at = |i: usize, k: usize| data.x[i * size + k];
+    let mut scale = vec![0.0; rows * rows];
+    for i in 0..rows {
+        for j in 0..=i {
+            let inner: f64 = members
+                .iter()
+                .map(|&k| at(i, k) * at(j, k) * data.problem.prior.slab[k])
+                .sum();
+            scale[i * rows + j] = inner + f64::from(i == j);
+            scale[j * rows + i] = scale[i * rows + j];
+        }
+    }
+    scale
 }

@@ -4,7 +4,7 @@ use super::*;
 use crate::robot::{Motion, nominal_torque};
 use crate::self_check::testing::arm;
 use crate::signal::{Channels, DerivedFrom, JointHistory, Raw, Recording, Warmth, prepare};
-use crate::term::{Family, LibrarySettings};
+use crate::term::{Family, LibrarySettings, Term};
 
 const DOF: usize = 4;
 const LEN: usize = 20_000;
@@ -70,94 +70,118 @@ fn log() -> Recording {
     }
 }
 
-/// Truth: the element itself. The column of r = 5 mrad has all of the Coulomb friction, warmth is `e^(−t/T)` less its mean.
+/// Mean warmth: the column is the difference from it.
+const MEAN: f64 = 0.3;
+
+/// Coefficients by column: the column of r = 5 mrad has all of the Coulomb friction, warmth is `e^(−t/T)` less its mean.
+fn truth(library: &Library) -> Vec<f64> {
+    let of = |term: &Term| match term.name.rsplit('.').next() {
+        Some("stop2") => FRICTION,
+        Some("coulomb") if term.family == Family::WarmUp => COLD,
+        Some("coulomb") => FRICTION + COLD * MEAN,
+        _ => 0.0,
+    };
+    let columns = library.columns().iter();
+    columns.map(|&term| of(&library.terms()[term])).collect()
+}
+
+fn pipeline(motion_interval: f64) -> Pipeline {
+    let history = JointHistory {
+        thresholds: vec![1.5e-3, R, 15e-3],
+        warmth: Some(Warmth::Time {
+            constant: CONSTANT,
+            mean: MEAN,
+            later_mean: 0.2,
+        }),
+    };
+    Pipeline {
+        cutoff_hz: 5.0,
+        motion_cutoff_hz: 20.0,
+        rate_hz: 12.5,
+        motion_interval,
+        coulomb_velocity: 0.02,
+        standstill_velocity: vec![0.02; DOF],
+        derived_from: vec![DerivedFrom::Velocity; DOF],
+        history: vec![history; DOF],
+        ..Pipeline::off(DOF)
+    }
+}
+
+/// What rows are made of.
+struct World {
+    robot: Robot,
+    library: Library,
+    pipeline: Pipeline,
+    trajectory: Trajectory,
+}
+
+impl World {
+    /// Row by row, so that blocks do not matter: all columns in slices of at most so many rows, and the largest torque that the truth leaves.
+    fn numbers(&self, signal: RowSignal, most: usize) -> (Vec<f64>, f64) {
+        let (pipeline, trajectory) = (&self.pipeline, &self.trajectory);
+        let truth = truth(&self.library);
+        let slices = slices(pipeline, trajectory, signal, f64::NEG_INFINITY, most);
+        let (mut all, mut worst) = (Vec::new(), 0.0_f64);
+        let mut look = |block: &RowBlock<'_>| {
+            for row in 0..block.len {
+                for rows in &block.joints {
+                    let own = all.len();
+                    let columns = 0..rows.columns.len();
+                    all.extend(columns.map(|i| rows.x[i * rows.stride + row]));
+                    let columns = rows.columns.iter().zip(&all[own..]);
+                    let explained: f64 = columns.map(|(&k, x)| truth[k] * x).sum();
+                    let left = rows.measured[row] - rows.nominal[row] - explained;
+                    if block.time[row] > 101.0 {
+                        worst = worst.max(left.abs());
+                        assert!(!rows.standstill[row], "known by then");
+                    }
+                }
+            }
+            Ok(())
+        };
+        visit_slices(
+            &self.robot,
+            &self.library,
+            pipeline,
+            trajectory,
+            signal,
+            &slices,
+            &mut look,
+        )
+        .unwrap();
+        (all, worst)
+    }
+}
+
+/// Truth: the element itself.
 #[test]
 fn an_element_that_bends_and_slips_is_explained_by_its_column() {
-    let robot = arm(1.0);
     let settings = LibrarySettings {
         families: vec![Family::Coulomb, Family::Hysteresis, Family::WarmUp],
         coulomb_velocity: 0.02,
         ..LibrarySettings::default()
     };
-    let library = Library::propose(&robot, &settings).unwrap().0;
-    let mean = 0.3;
-    let truth: Vec<f64> = (library.columns().iter())
-        .map(
-            |&term| match library.terms()[term].name.rsplit('.').next() {
-                Some("stop2") => FRICTION,
-                Some("coulomb") if library.terms()[term].family == Family::WarmUp => COLD,
-                Some("coulomb") => FRICTION + COLD * mean,
-                _ => 0.0,
-            },
-        )
-        .collect();
     let log = log();
-    let history = JointHistory {
-        thresholds: vec![1.5e-3, R, 15e-3],
-        warmth: Some(Warmth::Time {
-            constant: CONSTANT,
-            mean,
-            later_mean: 0.2,
-        }),
-    };
     for motion_interval in [0.0, 0.007] {
-        let pipeline = Pipeline {
-            cutoff_hz: 5.0,
-            motion_cutoff_hz: 20.0,
-            rate_hz: 12.5,
-            motion_interval,
-            coulomb_velocity: 0.02,
-            standstill_velocity: vec![0.02; DOF],
-            derived_from: vec![DerivedFrom::Velocity; DOF],
-            history: vec![history.clone(); DOF],
-            ..Pipeline::off(DOF)
+        let (robot, pipeline) = (arm(1.0), pipeline(motion_interval));
+        let prepared = prepare(&robot, &log, &pipeline).unwrap();
+        let (trajectory, _) = prepared.align(&pipeline, Raw::All).unwrap();
+        let library = Library::propose(&robot, &settings).unwrap().0;
+        let world = World {
+            robot,
+            library,
+            pipeline,
+            trajectory,
         };
-        let (trajectory, _) = prepare(&robot, &log, &pipeline)
-            .unwrap()
-            .align(&pipeline, Raw::All)
-            .unwrap();
         for signal in [RowSignal::Filtered, RowSignal::Raw] {
-            // Row by row, so that blocks do not matter.
-            let numbers = |most: usize| {
-                let slices = slices(&pipeline, &trajectory, signal, f64::NEG_INFINITY, most);
-                let (mut all, mut worst) = (Vec::new(), 0.0_f64);
-                let mut look = |block: &RowBlock<'_>| {
-                    for row in 0..block.len {
-                        for rows in &block.joints {
-                            let own = all.len();
-                            let columns = 0..rows.columns.len();
-                            all.extend(columns.map(|i| rows.x[i * rows.stride + row]));
-                            let columns = rows.columns.iter().zip(&all[own..]);
-                            let explained: f64 = columns.map(|(&k, x)| truth[k] * x).sum();
-                            let left = rows.measured[row] - rows.nominal[row] - explained;
-                            if block.time[row] > 101.0 {
-                                worst = worst.max(left.abs());
-                                assert!(!rows.standstill[row], "known by then");
-                            }
-                        }
-                    }
-                    Ok(())
-                };
-                visit_slices(
-                    &robot,
-                    &library,
-                    &pipeline,
-                    &trajectory,
-                    signal,
-                    &slices,
-                    &mut look,
-                )
-                .unwrap();
-                (all, worst)
-            };
-            let (whole, worst) = numbers(usize::MAX);
+            let (whole, worst) = world.numbers(signal, usize::MAX);
             // As logged, a thinned clock rounds off the corner where the element begins to slip.
             let limit = match signal {
                 RowSignal::Filtered => 0.02 * FRICTION,
                 RowSignal::Raw => 0.05 * FRICTION,
             };
             assert!(worst < limit, "{signal:?}, {motion_interval}: {worst}");
-            assert_eq!(whole, numbers(77).0);
+            assert_eq!(whole, world.numbers(signal, 77).0);
         }
     }
 }

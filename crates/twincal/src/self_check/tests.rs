@@ -6,12 +6,15 @@ use crate::error::Code;
 use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
 
-fn check(trajectory: &Trajectory) -> Result<Vec<Finding>> {
-    let pipeline = Pipeline {
+fn filtered() -> Pipeline {
+    Pipeline {
         cutoff_hz: 5.0,
         ..Pipeline::off(4)
-    };
-    self_check(&arm(1.0), &pipeline, [trajectory])
+    }
+}
+
+fn check(trajectory: &Trajectory) -> Result<Vec<Finding>> {
+    self_check(&arm(1.0), &filtered(), [trajectory])
 }
 
 fn said(trajectory: &Trajectory) -> Vec<(String, String)> {
@@ -168,11 +171,7 @@ fn case_19_and_20_torque_of_all_joints_of_quite_another_size_is_named_without_it
             let other = (0.013 * i as f64).sin() + 0.5 * (0.031 * i as f64).cos();
             *tau = factor * 100.0 * other + friction * segment.qd[i];
         }
-        let pipeline = Pipeline {
-            cutoff_hz: 5.0,
-            ..Pipeline::off(4)
-        };
-        let findings = self_check(robot, &pipeline, [&log]).unwrap();
+        let findings = self_check(robot, &filtered(), [&log]).unwrap();
         let said = findings
             .into_iter()
             .map(|f| (f.code.to_string(), f.subject));
@@ -191,27 +190,25 @@ fn case_19_and_20_torque_of_all_joints_of_quite_another_size_is_named_without_it
     assert_eq!(of(0.0, 1e5), told);
 }
 
+/// The arm with the effort limits of its joints, N·m.
+fn limited(efforts: [f64; 4]) -> Robot {
+    let mut description = arm(1.0).description().clone();
+    for (joint, effort) in description.joints.iter_mut().zip(efforts) {
+        joint.limits.effort = Some(effort);
+    }
+    Robot::new(description, &BTreeMap::new()).unwrap().0
+}
+
 /// Friction explains all of a torque whose model's part is small; a model that says what drives can do still tells thousandths.
 #[test]
 fn case_20_torque_far_beyond_the_models_effort_limit_is_in_another_unit() {
-    let pipeline = Pipeline {
-        cutoff_hz: 5.0,
-        ..Pipeline::off(4)
-    };
-    let limited = |efforts: [f64; 4]| {
-        let mut description = arm(1.0).description().clone();
-        for (joint, effort) in description.joints.iter_mut().zip(efforts) {
-            joint.limits.effort = Some(effort);
-        }
-        Robot::new(description, &BTreeMap::new()).unwrap().0
-    };
     let of = |robot: &Robot, factor: f64| {
         let mut log = log(0.0);
         let s = &mut log.segments[0];
         for i in 3 * LEN..4 * LEN {
             s.tau[i] = factor * (1.5 * s.qd[i] + 2.0 * (s.qd[i] / 0.01).tanh());
         }
-        look(robot, &pipeline, [&log]).unwrap()
+        look(robot, &filtered(), [&log]).unwrap()
     };
     let robot = limited([100.0, 100.0, 100.0, 10.0]);
     assert_eq!(of(&robot, 1.0).findings, []);
@@ -233,10 +230,18 @@ fn case_20_torque_far_beyond_the_models_effort_limit_is_in_another_unit() {
     assert!(said.message.contains("the effort limit of the model (10)"));
     let factors = seen.joints.iter().map(|joint| joint.torque_factor);
     assert!(factors.eq([None, None, None, Some(1e-3)]));
-    // All of them: one finding, with a factor for every joint.
+    // Limits that nothing keeps are made up.
+    assert_eq!(of(&limited([1e-3; 4]), 1.0).findings, []);
+    assert_eq!(of(&limited([1.0, 1.0, 1.0, 0.05]), 1.0).findings, []);
+}
+
+/// One finding, with a factor for every joint.
+#[test]
+fn case_20_torque_of_all_joints_far_beyond_their_effort_limits_is_named_once() {
+    let robot = limited([100.0, 100.0, 100.0, 10.0]);
     let mut all = log(0.0);
     all.segments[0].tau.iter_mut().for_each(|tau| *tau *= 1e3);
-    let seen = look(&robot, &pipeline, [&all]).unwrap();
+    let seen = look(&robot, &filtered(), [&all]).unwrap();
     assert_eq!(seen.findings.len(), 1, "{:#?}", seen.findings);
     assert_eq!(
         (seen.findings[0].code.as_str(), &*seen.findings[0].subject),
@@ -248,7 +253,7 @@ fn case_20_torque_far_beyond_the_models_effort_limit_is_in_another_unit() {
     all.segments[0].tau = (all.segments[0].qd.iter())
         .map(|qd| 1e3 * (1.5 * qd + 2.0 * (qd / 0.01).tanh()))
         .collect();
-    let effort = |robot: &Robot| look(robot, &pipeline, [&all]).unwrap().findings;
+    let effort = |robot: &Robot| look(robot, &filtered(), [&all]).unwrap().findings;
     let said = effort(&limited([20.0, 20.0, 20.0, 10.0]));
     assert!(
         said.len() == 1 && said[0].message.contains("on every joint"),
@@ -260,9 +265,6 @@ fn case_20_torque_far_beyond_the_models_effort_limit_is_in_another_unit() {
         said.len() == 1 && said[0].message.contains("of all joints together is"),
         "{said:#?}"
     );
-    // Limits that nothing keeps are made up.
-    assert_eq!(of(&limited([1e-3; 4]), 1.0).findings, []);
-    assert_eq!(of(&limited([1.0, 1.0, 1.0, 0.05]), 1.0).findings, []);
 }
 
 #[test]
@@ -293,8 +295,17 @@ fn case_21_a_turned_sign_is_named_with_its_joint() {
         findings[0].message.contains("its position and velocity"),
         "{findings:#?}"
     );
-    // Position alone, or velocity alone (with the acceleration that comes of it): that they do not fit each other tells that one of them is
-    // turned, torque which.
+    // All drives count the other way.
+    let mut all = log(0.0);
+    all.segments[0].tau.iter_mut().for_each(|t| *t *= -1.0);
+    let flips = ["j1", "j2", "j3", "j4"].map(|j| ("sign_flip".to_owned(), j.to_owned()));
+    assert_eq!(said(&all), flips);
+}
+
+/// Position alone, or velocity alone (with the acceleration that comes of it): that they do not fit each other tells that one of them is
+/// turned, torque which.
+#[test]
+fn case_21_a_turned_sign_of_position_or_velocity_alone_is_named_with_its_joint() {
     for joint in 0..4 {
         for (position, words) in [
             (
@@ -321,11 +332,6 @@ fn case_21_a_turned_sign_is_named_with_its_joint() {
             assert!(findings[0].message.contains(words), "{findings:#?}");
         }
     }
-    // All drives count the other way.
-    let mut all = log(0.0);
-    all.segments[0].tau.iter_mut().for_each(|t| *t *= -1.0);
-    let flips = ["j1", "j2", "j3", "j4"].map(|j| ("sign_flip".to_owned(), j.to_owned()));
-    assert_eq!(said(&all), flips);
 }
 
 #[test]

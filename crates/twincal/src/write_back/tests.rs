@@ -177,16 +177,8 @@ fn a_point_mass_gets_a_body() {
     assert!(factor(&pseudo_inertia(&parameters[0])).is_some());
 }
 
-/// Brute force: 20 000 points that are nearer than the answer in the metric, none of them a body. Two links at once, errors correlated.
-#[test]
-fn nothing_nearer_is_physical() {
-    let mut state = 7_u64;
-    let mut uniform = || {
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
-    };
+/// Two links whose change is not physical.
+fn two_links() -> [Link<'static>; 2] {
     let nominal = points(&[
         (1.0, [0.1, 0.0, 0.0]),
         (1.0, [0.0, 0.12, 0.0]),
@@ -202,10 +194,23 @@ fn nothing_nearer_is_physical() {
             found,
         }
     };
-    let links = [
+    [
         link("a", [4, 7, 9], [-0.04, 0.02, -0.05]),
         link("b", [1, 2, 3], [0.2, -0.25, 0.1]),
-    ];
+    ]
+}
+
+/// Brute force: 20 000 points that are nearer than the answer in the metric, none of them a body. Two links at once, errors correlated.
+#[test]
+fn nothing_nearer_is_physical() {
+    let mut state = 7_u64;
+    let mut uniform = || {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+    };
+    let links = two_links();
     // Cov = root rootᵀ + 1e-12, T its inverse.
     let root: Vec<f64> = (0..400).map(|_| 3e-6 * uniform()).collect();
     let covariance: Vec<f64> = (0..400)
@@ -249,12 +254,9 @@ fn nothing_nearer_is_physical() {
     }
 }
 
-/// δᵀ M δ is what the robot with the change needs of other torque, by the recursion: links of a tree with sliders and a joint that
-/// mimics another.
-#[test]
-fn the_metric_is_the_square_of_the_torque_between_two_robots() {
-    let robot = tree();
-    let noise: Vec<JointNoise> = (robot.joint_names().iter().enumerate())
+/// Noise that differs from joint to joint; one joint has no effective row.
+fn joint_noise(robot: &Robot) -> Vec<JointNoise> {
+    (robot.joint_names().iter().enumerate())
         .map(|(j, name)| JointNoise {
             joint: (*name).to_owned(),
             sigma: 0.3 + 0.2 * j as f64,
@@ -268,7 +270,15 @@ fn the_metric_is_the_square_of_the_torque_between_two_robots() {
             out_of_band: 0.0,
             spread: Spread::default(),
         })
-        .collect();
+        .collect()
+}
+
+/// δᵀ M δ is what the robot with the change needs of other torque, by the recursion: links of a tree with sliders and a joint that
+/// mimics another.
+#[test]
+fn the_metric_is_the_square_of_the_torque_between_two_robots() {
+    let robot = tree();
+    let noise = joint_noise(&robot);
     let [q, qd, qdd] = random_states(&robot, 150);
     let motion = Motion {
         len: 150,

@@ -19,6 +19,36 @@ struct Truth {
     phi: f64,
 }
 
+impl Truth {
+    /// A draw from the prior: φ = b0/Gamma(a0); the urn of each family.
+    fn of(prior: &Prior, source: &mut Source) -> Self {
+        let phi = prior.scale / source.gamma(6);
+        let (mut seen, mut inside) = ([0, 0], [0, 0]);
+        let mut truth = Self {
+            included: [false; SIZE],
+            beta: [0.0; SIZE],
+            phi,
+        };
+        for k in 0..SIZE {
+            let family = prior.family[k];
+            let p = match prior.inclusion {
+                Inclusion::Probability(p) => p,
+                Inclusion::ExpectedTerms(terms) => {
+                    let b = SIZE as f64 / terms - 1.0;
+                    (1.0 + f64::from(inside[family])) / (1.0 + b + f64::from(seen[family]))
+                }
+            };
+            truth.included[k] = source.uniform() < p;
+            seen[family] += 1;
+            inside[family] += i32::from(truth.included[k]);
+            if truth.included[k] {
+                truth.beta[k] = (phi * prior.slab[k]).sqrt() * source.normal();
+            }
+        }
+        truth
+    }
+}
+
 /// One draw from the joint distribution of parameters and data; two families, correlated columns.
 fn simulate(source: &mut Source, inclusion: Inclusion) -> (Truth, Problem) {
     let prior = Prior::single(
@@ -29,39 +59,13 @@ fn simulate(source: &mut Source, inclusion: Inclusion) -> (Truth, Problem) {
         inclusion,
         (3.0, 2.0),
     );
-    // φ = b0/Gamma(a0); the urn of each family.
-    let phi = prior.scale / source.gamma(6);
-    let (mut seen, mut inside) = ([0, 0], [0, 0]);
-    let mut truth = Truth {
-        included: [false; SIZE],
-        beta: [0.0; SIZE],
-        phi,
-    };
-    for k in 0..SIZE {
-        let family = prior.family[k];
-        let b = match inclusion {
-            Inclusion::Probability(_) => 0.0,
-            Inclusion::ExpectedTerms(terms) => SIZE as f64 / terms - 1.0,
-        };
-        let p = match inclusion {
-            Inclusion::Probability(p) => p,
-            Inclusion::ExpectedTerms(_) => {
-                (1.0 + f64::from(inside[family])) / (1.0 + b + f64::from(seen[family]))
-            }
-        };
-        truth.included[k] = source.uniform() < p;
-        seen[family] += 1;
-        inside[family] += i32::from(truth.included[k]);
-        if truth.included[k] {
-            truth.beta[k] = (phi * prior.slab[k]).sqrt() * source.normal();
-        }
-    }
+    let truth = Truth::of(&prior, source);
     let (mut gram, mut xy, mut yy) = (vec![0.0; SIZE * SIZE], vec![0.0; SIZE], 0.0);
     for _ in 0..ROWS {
         let common = source.normal();
         let x: [f64; SIZE] = std::array::from_fn(|_| 0.6 * common + 0.8 * source.normal());
         let signal: f64 = x.iter().zip(&truth.beta).map(|(x, beta)| x * beta).sum();
-        let y = signal + phi.sqrt() * source.normal();
+        let y = signal + truth.phi.sqrt() * source.normal();
         for i in 0..SIZE {
             xy[i] += x[i] * y;
             (0..SIZE).for_each(|j| gram[i * SIZE + j] += x[i] * x[j]);

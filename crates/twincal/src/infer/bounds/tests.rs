@@ -222,39 +222,12 @@ fn bounds_on_sums_equal_brute_force() {
             .problem;
         problem.prior.lower[0] = 0.0;
         problem.prior.halves = [1.0, -1.0].map(|sign| both_ways(0, 1, sign)).to_vec();
-        let mut free = problem.clone();
-        free.prior.lower[0] = f64::NEG_INFINITY;
-        free.prior.halves.clear();
-        let posterior = exact::enumerate(&free).unwrap();
-        let (mut total, mut pip, mut mean, mut second) = (0.0, [0.0; 3], [0.0; 3], [0.0; 3]);
-        for model in &posterior.models {
-            let alone = Posterior {
-                models: vec![crate::posterior::Model {
-                    weight: 1.0,
-                    ..model.clone()
-                }],
-                ..posterior.clone()
-            };
-            let slab = &problem.prior.slab;
-            let mass = match (model.members.contains(&0), model.members.contains(&1)) {
-                (true, true) => (slab[0] / slab[1]).sqrt().atan() / std::f64::consts::PI,
-                (true, false) => 0.5,
-                _ => 1.0,
-            };
-            let draws = draw(&alone, 40_000, 5, 2);
-            for beta in draws.beta.chunks_exact(3) {
-                if beta[1].abs() <= beta[0] || (beta[0] >= 0.0 && !model.members.contains(&1)) {
-                    let weight = model.weight / mass;
-                    total += weight;
-                    for &k in &model.members {
-                        let k = k as usize;
-                        pip[k] += weight;
-                        mean[k] += weight * beta[k];
-                        second[k] += weight * beta[k] * beta[k];
-                    }
-                }
-            }
-        }
+        let Kept {
+            total,
+            pip,
+            mean,
+            second,
+        } = kept_draws(&problem);
         for (name, got) in [
             ("exact", exact::enumerate(&problem).unwrap()),
             ("search", approximate(&problem, None).unwrap()),
@@ -280,6 +253,53 @@ fn bounds_on_sums_equal_brute_force() {
             }
         }
     }
+}
+
+/// Sums over the draws that keep |a| ≤ c, by weight: of 1, and by column of z, β and β².
+#[derive(Default)]
+struct Kept {
+    total: f64,
+    pip: [f64; 3],
+    mean: [f64; 3],
+    second: [f64; 3],
+}
+
+/// Draws of every model without bounds; c is column 0, a column 1.
+fn kept_draws(problem: &Problem) -> Kept {
+    let mut free = problem.clone();
+    free.prior.lower[0] = f64::NEG_INFINITY;
+    free.prior.halves.clear();
+    let posterior = exact::enumerate(&free).unwrap();
+    let mut kept = Kept::default();
+    for model in &posterior.models {
+        let alone = Posterior {
+            models: vec![crate::posterior::Model {
+                weight: 1.0,
+                ..model.clone()
+            }],
+            ..posterior.clone()
+        };
+        let slab = &problem.prior.slab;
+        let mass = match (model.members.contains(&0), model.members.contains(&1)) {
+            (true, true) => (slab[0] / slab[1]).sqrt().atan() / std::f64::consts::PI,
+            (true, false) => 0.5,
+            _ => 1.0,
+        };
+        let draws = draw(&alone, 40_000, 5, 2);
+        for beta in draws.beta.chunks_exact(3) {
+            if beta[1].abs() <= beta[0] || (beta[0] >= 0.0 && !model.members.contains(&1)) {
+                let weight = model.weight / mass;
+                kept.total += weight;
+                for &k in &model.members {
+                    let k = k as usize;
+                    kept.pip[k] += weight;
+                    kept.mean[k] += weight * beta[k];
+                    kept.second[k] += weight * beta[k] * beta[k];
+                }
+            }
+        }
+    }
+    kept
 }
 
 /// A model that lacks the column without which a sum's other terms are 0 has no probability, however much the data ask for it.

@@ -16,10 +16,46 @@ struct Plain {
 }
 
 fn plain(problem: &Problem) -> Plain {
-    let (size, prior) = (problem.xy.len(), &problem.prior);
-    let shape = prior.shape + problem.n / 2.0;
-    let mut models = Vec::new();
-    for set in 0u32..1 << size {
+    let size = problem.xy.len();
+    let sets = 0u32..1 << size;
+    let models: Vec<PlainModel> = sets.map(|set| PlainModel::new(problem, set)).collect();
+    let top = (models.iter().map(|m| m.log)).fold(f64::NEG_INFINITY, f64::max);
+    let total: f64 = models.iter().map(|m| (m.log - top).exp()).sum();
+    let mut out = Plain {
+        inclusion: vec![0.0; size],
+        mean: vec![0.0; size],
+        sd: vec![0.0; size],
+        noise: 0.0,
+        log_evidence: top + total.ln(),
+    };
+    for model in &models {
+        let w = (model.log - top).exp() / total;
+        out.noise += w * model.phi;
+        for (i, &k) in model.members.iter().enumerate() {
+            out.inclusion[k] += w;
+            out.mean[k] += w * model.mean[i];
+            out.sd[k] += w * model.second[i];
+        }
+    }
+    for k in 0..size {
+        out.sd[k] = (out.sd[k] - out.mean[k] * out.mean[k]).sqrt();
+    }
+    out
+}
+
+/// One set of columns: log p(y, z), E[β], E[β²] and E[φ].
+struct PlainModel {
+    log: f64,
+    members: Vec<usize>,
+    mean: Vec<f64>,
+    second: Vec<f64>,
+    phi: f64,
+}
+
+impl PlainModel {
+    fn new(problem: &Problem, set: u32) -> Self {
+        let (size, prior) = (problem.xy.len(), &problem.prior);
+        let shape = prior.shape + problem.n / 2.0;
         let members: Vec<usize> = (0..size).filter(|k| set >> k & 1 == 1).collect();
         let count = members.len();
         let mut a: Vec<f64> = members
@@ -30,12 +66,8 @@ fn plain(problem: &Problem) -> Plain {
         let factor = Cholesky::new(&a, count).unwrap();
         let mut mean: Vec<f64> = members.iter().map(|&k| problem.xy[k]).collect();
         factor.solve(&mut mean);
-        let rss = problem.yy
-            - members
-                .iter()
-                .zip(&mean)
-                .map(|(&k, m)| problem.xy[k] * m)
-                .sum::<f64>();
+        let explained = members.iter().zip(&mean).map(|(&k, m)| problem.xy[k] * m);
+        let rss = problem.yy - explained.sum::<f64>();
         let scale = prior.scale + rss / 2.0;
         let mut families = vec![0; prior.families()];
         members
@@ -55,30 +87,14 @@ fn plain(problem: &Problem) -> Plain {
         let second: Vec<f64> = (0..count)
             .map(|i| mean[i] * mean[i] + phi * inverse[i * count + i])
             .collect();
-        models.push((log, members, mean, second, phi));
-    }
-    let top = models.iter().map(|m| m.0).fold(f64::NEG_INFINITY, f64::max);
-    let total: f64 = models.iter().map(|m| (m.0 - top).exp()).sum();
-    let mut out = Plain {
-        inclusion: vec![0.0; size],
-        mean: vec![0.0; size],
-        sd: vec![0.0; size],
-        noise: 0.0,
-        log_evidence: top + total.ln(),
-    };
-    for (log, members, mean, second, phi) in &models {
-        let w = (log - top).exp() / total;
-        out.noise += w * phi;
-        for (i, &k) in members.iter().enumerate() {
-            out.inclusion[k] += w;
-            out.mean[k] += w * mean[i];
-            out.sd[k] += w * second[i];
+        Self {
+            log,
+            members,
+            mean,
+            second,
+            phi,
         }
     }
-    for k in 0..size {
-        out.sd[k] = (out.sd[k] - out.mean[k] * out.mean[k]).sqrt();
-    }
-    out
 }
 
 fn agree(problem: &Problem, tolerance: f64) {

@@ -70,34 +70,7 @@ fn nearly_singular_models_leave_no_rounding_behind() {
 /// Squares of components and exchanges, by determinants and forms of whole models.
 fn compare_blocks(tableau: &Tableau<'_>, standard: &Standard) {
     let count = standard.blocks.len();
-    // (ln |A_zz| Π v, c) of a model
-    let model = |holds: &dyn Fn(usize) -> bool| -> (f64, f64) {
-        let members: Vec<usize> = (0..count)
-            .filter(|&b| holds(b))
-            .flat_map(|b| standard.blocks[b].range())
-            .collect();
-        let (size, own) = (standard.size(), members.len());
-        let at = |i: usize, j: usize| standard.matrix[i * size + j];
-        let block: Vec<f64> = members
-            .iter()
-            .flat_map(|&i| members.iter().map(move |&j| at(i, j)))
-            .collect();
-        let factor = Cholesky::new(&block, own).unwrap();
-        let mut right: Vec<f64> = members
-            .iter()
-            .map(|&i| (0..size).map(|j| at(i, j) * standard.center[j]).sum())
-            .collect();
-        let whole: f64 = (0..size)
-            .map(|i| {
-                let row: f64 = (0..size).map(|j| at(i, j) * standard.center[j]).sum();
-                row * standard.center[i]
-            })
-            .sum();
-        factor.solve_lower(&mut right);
-        let slabs: f64 = members.iter().map(|&i| standard.precision[i].ln()).sum();
-        let explained: f64 = right.iter().map(|x| x * x).sum();
-        (factor.log_determinant() - slabs, whole - explained)
-    };
+    let model = |holds: &dyn Fn(usize) -> bool| whole_model(standard, holds);
     let now = model(&|b| tableau.holds(b));
     let check = |then: (f64, f64), (d, change): (f64, f64), what: &str| {
         let off = d.ln() - (then.0 - now.0);
@@ -129,6 +102,35 @@ fn compare_blocks(tableau: &Tableau<'_>, standard: &Standard) {
         let pivot = Pivot::new(tableau, &[leaves], &entering);
         check(then, (pivot.determinant, pivot.change), "exchange");
     }
+}
+
+/// ln |A_zz| Π v and c of a model.
+fn whole_model(standard: &Standard, holds: &dyn Fn(usize) -> bool) -> (f64, f64) {
+    let members: Vec<usize> = (0..standard.blocks.len())
+        .filter(|&b| holds(b))
+        .flat_map(|b| standard.blocks[b].range())
+        .collect();
+    let (size, own) = (standard.size(), members.len());
+    let at = |i: usize, j: usize| standard.matrix[i * size + j];
+    let block: Vec<f64> = members
+        .iter()
+        .flat_map(|&i| members.iter().map(move |&j| at(i, j)))
+        .collect();
+    let factor = Cholesky::new(&block, own).unwrap();
+    let mut right: Vec<f64> = members
+        .iter()
+        .map(|&i| (0..size).map(|j| at(i, j) * standard.center[j]).sum())
+        .collect();
+    let whole: f64 = (0..size)
+        .map(|i| {
+            let row: f64 = (0..size).map(|j| at(i, j) * standard.center[j]).sum();
+            row * standard.center[i]
+        })
+        .sum();
+    factor.solve_lower(&mut right);
+    let slabs: f64 = members.iter().map(|&i| standard.precision[i].ln()).sum();
+    let explained: f64 = right.iter().map(|x| x * x).sum();
+    (factor.log_determinant() - slabs, whole - explained)
 }
 
 fn compare(tableau: &Tableau<'_>, standard: &Standard) {

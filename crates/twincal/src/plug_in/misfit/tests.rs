@@ -8,6 +8,7 @@ use crate::observations::Observations;
 use crate::random::Random;
 use crate::statistics::{Purpose, Runs, Sums, Training};
 use crate::term::Family;
+use std::borrow::Cow;
 
 /// A joint that swings, with two columns (q̇ and q̈ like) and what no column describes: `unknown` times sin 3q.
 fn swinging(rows: usize, seed: u64, unknown: f64) -> Observations {
@@ -67,66 +68,18 @@ fn both_are_their_definitions() {
     let log = swinging(rows, 3, 0.7);
     let fit = fitted(&log, &columns);
     let found = measured(&log, &columns, &fit);
-
-    let (q, qd) = (log.q[0].some(0..rows), log.qd[0].some(0..rows));
-    let (x, y) = (&log.joints[0].x, &log.joints[0].y);
-    let decoy = |k: usize, row: usize| {
-        let (harmonic, sense) = (k % 17, (qd[row] / 0.02).tanh());
-        let order = harmonic.div_ceil(2) as f64;
-        let shape = match harmonic {
-            0 => 1.0,
-            odd if odd % 2 == 1 => (order * q[row]).cos(),
-            _ => (order * q[row]).sin(),
-        };
-        if k < 17 { shape } else { shape * sense }
-    };
-    let factor = fit.plug_in.factor(0);
-    let slab = &fit.problem.prior.slab;
-    // [A, b] of some rows
-    let normal = |own: &dyn Fn(usize) -> bool| {
-        let (mut a, mut b) = ([0.0; 4], [0.0; 2]);
-        for row in (0..rows).filter(|&row| own(row)) {
-            for i in 0..2 {
-                for j in 0..2 {
-                    a[2 * i + j] += factor * x[i * rows + row] * x[j * rows + row];
-                }
-                b[i] += factor * x[i * rows + row] * y[row];
-            }
-        }
-        (a, b)
-    };
-    let inverse = |mut a: [f64; 4], slab: &[f64]| {
-        (a[0], a[3]) = (a[0] + 1.0 / slab[0], a[3] + 1.0 / slab[1]);
-        let det = a[0] * a[3] - a[1] * a[2];
-        [a[3] / det, -a[1] / det, -a[2] / det, a[0] / det]
-    };
-    let form = |c: [f64; 4], g: [f64; 2]| {
-        c[0] * g[0] * g[0] + (c[1] + c[2]) * g[0] * g[1] + c[3] * g[1] * g[1]
-    };
-    // (φᵀr, φᵀφ, Xᵀφ) over some rows
-    let sums = |k: usize, beta: [f64; 2], own: &dyn Fn(usize) -> bool| {
-        let (mut pr, mut square, mut g) = (0.0, 0.0, [0.0; 2]);
-        for row in (0..rows).filter(|&row| own(row)) {
-            let phi = decoy(k, row);
-            pr += phi * (y[row] - beta[0] * x[row] - beta[1] * x[rows + row]);
-            square += phi * phi;
-            g = [g[0] + phi * x[row], g[1] + phi * x[rows + row]];
-        }
-        (pr, square, g)
-    };
+    let own = Rows::new(&log, fit.plug_in.factor(0));
     let mean = [fit.posterior.mean[0], fit.posterior.mean[1]];
-    let (a, _) = normal(&|_| true);
-    let c = inverse(a, slab);
-    let rss: f64 = (0..rows)
-        .map(|row| (y[row] - mean[0] * x[row] - mean[1] * x[rows + row]).powi(2))
-        .sum();
+    let (a, _) = own.normal(&|_| true);
+    let c = inverse(a, &fit.problem.prior.slab);
+    let rss: f64 = (0..rows).map(|row| own.residual(mean, row).powi(2)).sum();
     let trace = a[0] * c[0] + a[1] * c[2] + a[2] * c[1] + a[3] * c[3];
     let variance = rss / (rows as f64 - trace);
     let (mut within, mut left_out) = ([0.0; 2], [0.0; 2]);
     let mut kept = Vec::new();
     for k in 0..34 {
-        let (pr, square, g) = sums(k, mean, &|_| true);
-        let left = square - factor * form(c, g);
+        let (pr, square, g) = own.along(k, mean, &|_| true);
+        let left = square - own.factor * form(c, g);
         if left > 0.05 * square {
             kept.push(k);
             within = [within[0] + pr * pr, within[1] + left];
@@ -134,7 +87,7 @@ fn both_are_their_definitions() {
     }
     for piece in 0..5 {
         let inside = move |row: usize| row >= piece * rows / 5 && row < (piece + 1) * rows / 5;
-        let (a, b) = normal(&|row| !inside(row));
+        let (a, b) = own.normal(&|row| !inside(row));
         // The slab is that of the other pieces.
         let others: Vec<_> = (0..5)
             .filter(|p| *p != piece)
@@ -144,8 +97,8 @@ fn both_are_their_definitions() {
         let c = inverse(a, &problem.prior.slab);
         let beta = [c[0] * b[0] + c[1] * b[1], c[2] * b[0] + c[3] * b[1]];
         for &k in &kept {
-            let (pr, square, g) = sums(k, beta, &inside);
-            let expected = square + factor * form(c, g);
+            let (pr, square, g) = own.along(k, beta, &inside);
+            let expected = square + own.factor * form(c, g);
             left_out = [left_out[0] + pr * pr, left_out[1] + expected];
         }
     }
@@ -154,6 +107,84 @@ fn both_are_their_definitions() {
     close(found.within[0], within[0] / (within[1] * variance));
     close(found.left_out[0], left_out[0] / (left_out[1] * variance));
     assert!(found.within[0] > 3.0, "the planted torque shows: {found:?}");
+}
+
+/// The rows of a log with two columns.
+struct Rows<'a> {
+    q: Cow<'a, [f64]>,
+    qd: Cow<'a, [f64]>,
+    x: [&'a [f64]; 2],
+    y: &'a [f64],
+    /// Weight of a row.
+    factor: f64,
+}
+
+impl<'a> Rows<'a> {
+    fn new(log: &'a Observations, factor: f64) -> Self {
+        let joint = &log.joints[0];
+        let rows = joint.y.len();
+        let (a, b) = joint.x.split_at(rows);
+        Self {
+            q: log.q[0].some(0..rows),
+            qd: log.qd[0].some(0..rows),
+            x: [a, b],
+            y: &joint.y,
+            factor,
+        }
+    }
+
+    fn decoy(&self, k: usize, row: usize) -> f64 {
+        let (harmonic, sense) = (k % 17, (self.qd[row] / 0.02).tanh());
+        let order = harmonic.div_ceil(2) as f64;
+        let shape = match harmonic {
+            0 => 1.0,
+            odd if odd % 2 == 1 => (order * self.q[row]).cos(),
+            _ => (order * self.q[row]).sin(),
+        };
+        if k < 17 { shape } else { shape * sense }
+    }
+
+    fn residual(&self, beta: [f64; 2], row: usize) -> f64 {
+        self.y[row] - beta[0] * self.x[0][row] - beta[1] * self.x[1][row]
+    }
+
+    /// `[A, b]` of some rows.
+    fn normal(&self, own: &dyn Fn(usize) -> bool) -> ([f64; 4], [f64; 2]) {
+        let (mut a, mut b) = ([0.0; 4], [0.0; 2]);
+        for row in (0..self.y.len()).filter(|&row| own(row)) {
+            for i in 0..2 {
+                for j in 0..2 {
+                    a[2 * i + j] += self.factor * self.x[i][row] * self.x[j][row];
+                }
+                b[i] += self.factor * self.x[i][row] * self.y[row];
+            }
+        }
+        (a, b)
+    }
+
+    /// φᵀr, φᵀφ and Xᵀφ of a decoy over some rows.
+    fn along(&self, k: usize, beta: [f64; 2], own: &dyn Fn(usize) -> bool) -> (f64, f64, [f64; 2]) {
+        let (mut pr, mut square, mut g) = (0.0, 0.0, [0.0; 2]);
+        for row in (0..self.y.len()).filter(|&row| own(row)) {
+            let phi = self.decoy(k, row);
+            pr += phi * self.residual(beta, row);
+            square += phi * phi;
+            g = [g[0] + phi * self.x[0][row], g[1] + phi * self.x[1][row]];
+        }
+        (pr, square, g)
+    }
+}
+
+/// The inverse of A with the slab's precision.
+fn inverse(mut a: [f64; 4], slab: &[f64]) -> [f64; 4] {
+    (a[0], a[3]) = (a[0] + 1.0 / slab[0], a[3] + 1.0 / slab[1]);
+    let det = a[0] * a[3] - a[1] * a[2];
+    [a[3] / det, -a[1] / det, -a[2] / det, a[0] / det]
+}
+
+/// gᵀ C g.
+fn form(c: [f64; 4], g: [f64; 2]) -> f64 {
+    c[0] * g[0] * g[0] + (c[1] + c[2]) * g[0] * g[1] + c[3] * g[1] * g[1]
 }
 
 /// Independent noise: over 40 logs the mean of both is 1 within five standard errors (false alarm: 1e-6). Values below 1 are raised to it, so

@@ -82,7 +82,11 @@ fn coefficients_of_the_lagrangian_give_the_inverse_dynamics() {
         beta.iter().filter(|beta| **beta != 0.0).count(),
         coefficients.len()
     );
+    compare_torque(&robot, &library, &beta);
+}
 
+/// Φβ is the torque of the robot.
+fn compare_torque(robot: &Robot, library: &Library, beta: &[f64]) {
     let len = 100;
     let wave = |f: f64| -> Vec<f64> { (0..2 * len).map(|i| 3.0 * (f * i as f64).sin()).collect() };
     let (q, qd, qdd) = (wave(0.7), wave(1.3), wave(2.1));
@@ -93,7 +97,7 @@ fn coefficients_of_the_lagrangian_give_the_inverse_dynamics() {
         qdd: &qdd,
     };
     let mut expected = vec![0.0; 2 * len];
-    nominal_torque(&robot, motion, &mut expected);
+    nominal_torque(robot, motion, &mut expected);
     let mut out = vec![Vec::new(); 2];
     library.evaluate(motion, &mut out);
     for joint in 0..2 {

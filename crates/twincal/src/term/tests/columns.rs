@@ -206,39 +206,21 @@ fn any_batch_length_gives_the_same_bytes() {
     )
     .unwrap();
     let len = 150;
-    let [q, qd, qdd] = motion(2, len);
+    let channels = motion(2, len);
     let mut whole = vec![Vec::new(); 2];
-    library.evaluate(
-        Motion {
-            len,
-            q: &q,
-            qd: &qd,
-            qdd: &qdd,
-        },
-        &mut whole,
-    );
+    library.evaluate(of(&channels), &mut whole);
     let mut scratch = Scratch::default();
     for step in [1, 7, 64, 65, 149] {
         let mut start = 0;
         while start < len {
             let width = step.min(len - start);
-            let part = |x: &[f64]| -> Vec<f64> {
+            let some = channels.each_ref().map(|x| -> Vec<f64> {
                 (0..2)
                     .flat_map(|joint| x[joint * len + start..][..width].to_vec())
                     .collect()
-            };
-            let (q, qd, qdd) = (part(&q), part(&qd), part(&qdd));
+            });
             let mut out = vec![vec![f64::NAN; 3]; 2];
-            library.evaluate_with(
-                Motion {
-                    len: width,
-                    q: &q,
-                    qd: &qd,
-                    qdd: &qdd,
-                },
-                &mut out,
-                &mut scratch,
-            );
+            library.evaluate_with(of(&some), &mut out, &mut scratch);
             for joint in 0..2 {
                 for i in 0..library.columns_of_joint(joint).len() {
                     let expected = &whole[joint][i * len + start..][..width];
@@ -252,16 +234,18 @@ fn any_batch_length_gives_the_same_bytes() {
             start += width;
         }
     }
-    library.evaluate(
-        Motion {
-            len: 0,
-            q: &[],
-            qd: &[],
-            qdd: &[],
-        },
-        &mut whole,
-    );
+    library.evaluate(of(&Default::default()), &mut whole);
     assert!(whole.iter().all(Vec::is_empty));
+}
+
+/// A motion of two joints.
+fn of([q, qd, qdd]: &[Vec<f64>; 3]) -> Motion<'_> {
+    Motion {
+        len: q.len() / 2,
+        q,
+        qd,
+        qdd,
+    }
 }
 
 #[test]

@@ -128,6 +128,7 @@ fn rewritten(own: &RobotDescription, random: &mut Random) -> RobotDescription {
 }
 
 const JOINTS: [&str; 3] = ["joint1", "joint2", "joint3"];
+const STATES: usize = 5;
 
 /// Prior covariance of the torque on all joints at a few states, by component: Σ sd² column columnᵀ.
 fn kernels(description: &RobotDescription, frame: &str) -> BTreeMap<String, Vec<f64>> {
@@ -144,6 +145,27 @@ fn kernels(description: &RobotDescription, frame: &str) -> BTreeMap<String, Vec<
         ..LibrarySettings::default()
     };
     let (library, _) = Library::propose(&robot, &settings).unwrap();
+    let (torque, sds) = (column_torque(&robot, &library), library.prior_sds());
+    let mut all: BTreeMap<String, Vec<f64>> = BTreeMap::new();
+    for (column, &term) in library.columns().iter().enumerate() {
+        let own = &library.terms()[term];
+        let name = &library.components()[own.component].name;
+        let part = own.family == Family::PayloadTensor;
+        let kernel = all
+            .entry(format!("{name} {part}"))
+            .or_insert(vec![0.0; 9 * STATES * STATES]);
+        let sd = sds[column].unwrap();
+        for (i, a) in torque[column].iter().enumerate() {
+            for (j, b) in torque[column].iter().enumerate() {
+                kernel[i * 3 * STATES + j] += sd * sd * a * b;
+            }
+        }
+    }
+    all
+}
+
+/// Torque of every column on [`JOINTS`] at a few states, `joint * STATES + state`.
+fn column_torque(robot: &Robot, library: &Library) -> Vec<Vec<f64>> {
     let place = |name: &str| {
         robot
             .joint_names()
@@ -152,7 +174,7 @@ fn kernels(description: &RobotDescription, frame: &str) -> BTreeMap<String, Vec<
             .unwrap()
     };
     let places = JOINTS.map(place);
-    let len = 5;
+    let len = STATES;
     let channel = |rate: f64| {
         let mut values = vec![0.0; 3 * len];
         for (joint, &place) in places.iter().enumerate() {
@@ -172,30 +194,14 @@ fn kernels(description: &RobotDescription, frame: &str) -> BTreeMap<String, Vec<
     };
     let mut out = vec![Vec::new(); 3];
     library.evaluate(motion, &mut out);
-    let sds = library.prior_sds();
-    let mut torque = vec![vec![0.0; 3 * len]; sds.len()];
+    let mut torque = vec![vec![0.0; 3 * len]; library.columns().len()];
     for (joint, &place) in places.iter().enumerate() {
         for (row, &column) in library.columns_of_joint(place).iter().enumerate() {
             let own = &out[place][row * len..(row + 1) * len];
             torque[column][joint * len..(joint + 1) * len].copy_from_slice(own);
         }
     }
-    let mut all: BTreeMap<String, Vec<f64>> = BTreeMap::new();
-    for (column, &term) in library.columns().iter().enumerate() {
-        let own = &library.terms()[term];
-        let name = &library.components()[own.component].name;
-        let part = own.family == Family::PayloadTensor;
-        let kernel = all
-            .entry(format!("{name} {part}"))
-            .or_insert(vec![0.0; 9 * len * len]);
-        let sd = sds[column].unwrap();
-        for (i, a) in torque[column].iter().enumerate() {
-            for (j, b) in torque[column].iter().enumerate() {
-                kernel[i * 3 * len + j] += sd * sd * a * b;
-            }
-        }
-    }
-    all
+    torque
 }
 
 /// Everything that a posterior knows of a component before the data is this kernel, whose entries are the same to rounding.

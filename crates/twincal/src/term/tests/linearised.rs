@@ -53,46 +53,87 @@ fn truth(robot: &Robot, library: &Library, motion: Motion<'_>, beta: &[f64]) -> 
     torque
 }
 
+/// A robot with effects of every kind: its library, the library about these effects, a motion.
+struct World {
+    robot: Robot,
+    plain: Library,
+    there: Library,
+    /// Effects by column.
+    at: Vec<f64>,
+    /// Positions, velocities, accelerations.
+    channels: [Vec<f64>; 3],
+}
+
+impl World {
+    fn new() -> Self {
+        let robot = tree();
+        let settings = LibrarySettings {
+            families: vec![
+                Family::Payload,
+                Family::Density,
+                Family::Tilt,
+                Family::EncoderZero,
+                Family::Gain,
+                Family::LoadFriction,
+                Family::Viscous,
+            ],
+            generic: Some(false),
+            coulomb_velocity: 0.02,
+            ..LibrarySettings::default()
+        };
+        let (plain, _) = Library::propose(&robot, &settings).unwrap();
+        let effects = effects(&plain);
+        let linearised_at = effects.clone();
+        let (there, _) = Library::propose(
+            &robot,
+            &LibrarySettings {
+                linearised_at,
+                ..settings
+            },
+        )
+        .unwrap();
+        Self {
+            at: by_column(&plain, &effects),
+            channels: channels(&random_motions(robot.dof()), robot.dof()),
+            robot,
+            plain,
+            there,
+        }
+    }
+
+    fn motion(&self) -> Motion<'_> {
+        let [q, qd, qdd] = &self.channels;
+        let len = q.len() / self.robot.dof();
+        Motion { len, q, qd, qdd }
+    }
+
+    /// Torque of the robot with effects of these sizes.
+    fn truth(&self, beta: &[f64]) -> Vec<f64> {
+        truth(&self.robot, &self.plain, self.motion(), beta)
+    }
+
+    /// Length of the torque at the effects.
+    fn size(&self) -> f64 {
+        let torque = self.truth(&self.at);
+        distance(&torque, &vec![0.0; torque.len()])
+    }
+}
+
+fn distance(a: &[f64], b: &[f64]) -> f64 {
+    let squares = a.iter().zip(b).map(|(a, b)| (a - b).powi(2));
+    squares.sum::<f64>().sqrt()
+}
+
 /// At the effects the linear model is the robot with them, and beside them it is off by the square of how far: truth is that robot, from its numbers.
 #[test]
 fn a_library_about_effects_is_their_torque_to_first_order() {
-    let robot = tree();
-    let settings = LibrarySettings {
-        families: vec![
-            Family::Payload,
-            Family::Density,
-            Family::Tilt,
-            Family::EncoderZero,
-            Family::Gain,
-            Family::LoadFriction,
-            Family::Viscous,
-        ],
-        generic: Some(false),
-        coulomb_velocity: 0.02,
-        ..LibrarySettings::default()
-    };
-    let (plain, _) = Library::propose(&robot, &settings).unwrap();
-    let effects = effects(&plain);
-    let linearised_at = effects.clone();
-    let (there, _) = Library::propose(
-        &robot,
-        &LibrarySettings {
-            linearised_at,
-            ..settings
-        },
-    )
-    .unwrap();
+    let world = World::new();
+    let (plain, there) = (&world.plain, &world.there);
     assert_eq!(there.terms(), plain.terms());
     assert_eq!(there.prior_sds(), plain.prior_sds());
-    let states = random_motions(robot.dof());
-    let [q, qd, qdd] = channels(&states, robot.dof());
-    let (q, qd, qdd) = (&q[..], &qd[..], &qdd[..]);
-    let len = states.len();
-    let motion = Motion { len, q, qd, qdd };
-    let at = by_column(&plain, &effects);
     let error = |library: &Library, step: f64| -> f64 {
         let is_moved = |column: usize| plain.is_number_of_robot(column);
-        let beta: Vec<f64> = (at.iter().enumerate())
+        let beta: Vec<f64> = (world.at.iter().enumerate())
             .map(|(k, at)| {
                 at + if is_moved(k) {
                     step * (1.1 * k as f64).cos()
@@ -101,43 +142,36 @@ fn a_library_about_effects_is_their_torque_to_first_order() {
                 }
             })
             .collect();
-        let found = library.torque_with(&robot, motion, true, &beta);
-        let truth = truth(&robot, &plain, motion, &beta);
-        let squares = found.iter().zip(&truth).map(|(a, b)| (a - b).powi(2));
-        squares.sum::<f64>().sqrt()
+        let found = library.torque_with(&world.robot, world.motion(), true, &beta);
+        distance(&found, &world.truth(&beta))
     };
-    let size = truth(&robot, &plain, motion, &at)
-        .iter()
-        .map(|t| t * t)
-        .sum::<f64>()
-        .sqrt();
-    assert!(error(&there, 0.0) < 1e-12 * size);
+    let size = world.size();
+    assert!(error(there, 0.0) < 1e-12 * size);
     assert!(
-        error(&plain, 0.0) > 1e-3 * size,
+        error(plain, 0.0) > 1e-3 * size,
         "these effects multiply each other"
     );
-    let [near, far] = [error(&there, 1e-4), error(&there, 2e-4)];
+    let [near, far] = [error(there, 1e-4), error(there, 2e-4)];
     assert!(
         (far / near - 4.0).abs() < 0.05,
         "second order: {near} {far}"
     );
-    // Without the payload it is that of the other effects.
-    let mut without = at.clone();
+}
+
+#[test]
+fn without_the_payload_it_is_the_torque_of_the_other_effects() {
+    let world = World::new();
+    let plain = &world.plain;
+    let mut without = world.at.clone();
     for (k, &term) in plain.columns().iter().enumerate() {
         if plain.terms()[term].family.is_payload() {
             without[k] = 0.0;
         }
     }
-    let library = there.in_log(&robot, false);
-    let found = library.torque_with(&robot, motion, false, &at);
-    let expected = truth(&robot, &plain, motion, &without);
-    let left = found
-        .iter()
-        .zip(&expected)
-        .map(|(a, b)| (a - b).powi(2))
-        .sum::<f64>()
-        .sqrt();
-    assert!(left < 1e-12 * size, "{left}");
+    let library = world.there.in_log(&world.robot, false);
+    let found = library.torque_with(&world.robot, world.motion(), false, &world.at);
+    let left = distance(&found, &world.truth(&without));
+    assert!(left < 1e-12 * world.size(), "{left}");
 }
 
 /// A twin's file may say anything.

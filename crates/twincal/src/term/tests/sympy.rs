@@ -2,7 +2,7 @@
 
 use super::super::euler_lagrange::euler_lagrange;
 use super::super::expression::{
-    Graph, Slot, Tape, TapeScratch as Scratch, Variable, bounded_values, parse,
+    Graph, Id, Slot, Tape, TapeScratch as Scratch, Variable, bounded_values, parse,
 };
 use super::super::{Family, LibrarySettings};
 use super::{only, planar};
@@ -55,40 +55,7 @@ fn thirty_lagrangians_have_sympys_torque() {
         let mut graph = Graph::default();
         let phi = parse(&mut graph, &case.expression, &names).unwrap();
         let image = euler_lagrange(&mut graph, phi);
-        // the tape, all states in one batch
-        let outputs: Vec<_> = image
-            .iter()
-            .map(|&(joint, id)| {
-                (
-                    id,
-                    Slot {
-                        table: joint,
-                        row: 0,
-                    },
-                )
-            })
-            .collect();
-        let tape = Tape::new(&graph, &outputs);
-        let len = case.states.len();
-        let rows = |pick: fn(&State) -> &Vec<f64>| -> Vec<f64> {
-            (0..reference.joints)
-                .flat_map(|j| case.states.iter().map(move |state| pick(state)[j]))
-                .collect()
-        };
-        let (q, qd, qdd) = (rows(|s| &s.q), rows(|s| &s.qd), rows(|s| &s.qdd));
-        let mut out = vec![vec![0.0; len]; reference.joints];
-        tape.evaluate(
-            Motion {
-                len,
-                q: &q,
-                qd: &qd,
-                qdd: &qdd,
-            },
-            len,
-            &mut out,
-            &mut Scratch::default(),
-        );
-
+        let out = batch(&graph, &image, case, reference.joints);
         for (s, state) in case.states.iter().enumerate() {
             // and the scalar walk with its error bound
             let values = bounded_values(&graph, |variable| match variable {
@@ -117,6 +84,43 @@ fn thirty_lagrangians_have_sympys_torque() {
         }
     }
     assert_eq!(compared, 30 * 4 * 3);
+}
+
+/// Torque of every joint by the tape, all states in one batch.
+fn batch(graph: &Graph, image: &[(usize, Id)], case: &Case, joints: usize) -> Vec<Vec<f64>> {
+    let outputs: Vec<_> = image
+        .iter()
+        .map(|&(joint, id)| {
+            (
+                id,
+                Slot {
+                    table: joint,
+                    row: 0,
+                },
+            )
+        })
+        .collect();
+    let tape = Tape::new(graph, &outputs);
+    let len = case.states.len();
+    let rows = |pick: fn(&State) -> &Vec<f64>| -> Vec<f64> {
+        (0..joints)
+            .flat_map(|j| case.states.iter().map(move |state| pick(state)[j]))
+            .collect()
+    };
+    let (q, qd, qdd) = (rows(|s| &s.q), rows(|s| &s.qd), rows(|s| &s.qdd));
+    let mut out = vec![vec![0.0; len]; joints];
+    tape.evaluate(
+        Motion {
+            len,
+            q: &q,
+            qd: &qd,
+            qdd: &qdd,
+        },
+        len,
+        &mut out,
+        &mut Scratch::default(),
+    );
+    out
 }
 
 #[test]
