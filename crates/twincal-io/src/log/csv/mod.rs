@@ -162,7 +162,7 @@ impl<R: Read> Table<R> {
         findings
     }
 
-    /// Makes room for the rows that are `expected` after the first 1000; what will not fit is refused before it is allocated.
+    /// Makes room for as many rows as are `expected` after a look at the first 1000; what will not fit is refused before it is allocated.
     fn reserve(&self, cells: &mut Cells, expected: f64) -> Result<()> {
         // Columns that grow again and again are copied again and again.
         let bytes = cells.bytes_in_memory(1.01 * expected);
