@@ -49,32 +49,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut tau = vec![0.0; dof * len];
     nominal_torque(&robot, motion, &mut tau);
 
-    // The regressor comes in blocks that stay in the caches: use each before the next one is computed. Here all are kept.
     let regressor = Regressor::new(&robot);
-    let mut block = regressor.block(&robot);
+    let columns = link_columns(&robot, &regressor, motion);
     let bodies = robot.bodies();
-    let mut columns = vec![0.0; regressor.pairs().len() * 10 * len];
-    for first in (0..len).step_by(BLOCK) {
-        let samples = first..len.min(first + BLOCK);
-        regressor.evaluate(&robot, motion, samples.clone(), &mut block);
-        for (index, pair) in regressor.pairs().iter().enumerate() {
-            // Columns are about the body's frame (z along the joint); a constant map leads to the link's own frame.
-            let Some((_, frame)) = robot.body_of_link(bodies[pair.body]) else {
-                continue;
-            };
-            let map = to_body_frame(&frame);
-            for k in 0..10 {
-                let start = (index * 10 + k) * len;
-                let cells = &mut columns[start + samples.start..start + samples.end];
-                for i in (0..10).filter(|&i| map[i][k] != 0.0 && pair.present[i]) {
-                    for (cell, value) in cells.iter_mut().zip(block.column(index, i)) {
-                        *cell += map[i][k] * value;
-                    }
-                }
-            }
-        }
-    }
-
     let base = base_parameters(&robot);
     let pairs = regressor.pairs().iter();
     let pairs: Vec<[usize; 2]> = pairs.map(|p| [p.coordinate, p.body]).collect();
@@ -94,4 +71,35 @@ fn main() -> Result<(), Box<dyn Error>> {
         out.write_all(&value.to_le_bytes())?;
     }
     Ok(out.flush()?)
+}
+
+/// The regressor in the frames of the links, `pair × parameter × sample`.
+///
+/// It comes in blocks that stay in the caches: use each before the next one is computed. Here all are kept.
+fn link_columns(robot: &Robot, regressor: &Regressor, motion: Motion<'_>) -> Vec<f64> {
+    let len = motion.len;
+    let mut block = regressor.block(robot);
+    let bodies = robot.bodies();
+    let mut columns = vec![0.0; regressor.pairs().len() * 10 * len];
+    for first in (0..len).step_by(BLOCK) {
+        let samples = first..len.min(first + BLOCK);
+        regressor.evaluate(robot, motion, samples.clone(), &mut block);
+        for (index, pair) in regressor.pairs().iter().enumerate() {
+            // Columns are about the body's frame (z along the joint); a constant map leads to the link's own frame.
+            let Some((_, frame)) = robot.body_of_link(bodies[pair.body]) else {
+                continue;
+            };
+            let map = to_body_frame(&frame);
+            for k in 0..10 {
+                let start = (index * 10 + k) * len;
+                let cells = &mut columns[start + samples.start..start + samples.end];
+                for i in (0..10).filter(|&i| map[i][k] != 0.0 && pair.present[i]) {
+                    for (cell, value) in cells.iter_mut().zip(block.column(index, i)) {
+                        *cell += map[i][k] * value;
+                    }
+                }
+            }
+        }
+    }
+    columns
 }

@@ -2,9 +2,9 @@
 
 use super::check::role_in_fit;
 use super::inputs::{LogInput, Long, RobotInput};
-use super::start_threads;
 use super::summary::paragraph;
 use super::table::{print_table, table};
+use super::{replaced, start_threads};
 use crate::args::{Criterion as OfFlags, Design as Flags};
 use crate::failure::{Failure, Outcome};
 use crate::interrupts::{Caught, require_caller};
@@ -22,7 +22,7 @@ use twincal::robot::{Robot, RobotDescription};
 use twincal::signal::{Payload, choose_and_prepare};
 use twincal::term::{Family, Library, LibrarySettings};
 use twincal::words::significant as number;
-use twincal_io::artifact::{Artifact, Claim, Inputs, MODEL_MJCF, MODEL_URDF, Maker, Replace};
+use twincal_io::artifact::{Artifact, Claim, Inputs, MODEL_MJCF, MODEL_URDF, Maker};
 use twincal_io::collision::CollisionWorld;
 use twincal_io::config::{Config, Settings};
 use twincal_io::context::FileHash;
@@ -205,16 +205,7 @@ pub(super) fn run(flags: &Flags, terminal: &mut Terminal) -> Outcome<u8> {
     for text in words::beyond_model(&limits) {
         terminal.note(&format!("warning: {text}"));
     }
-    let settings = DesignSettings {
-        duration: flags.duration,
-        rate: flags.rate,
-        seed: flags.seed,
-        criterion: match flags.criterion {
-            OfFlags::Determinant => Criterion::Determinant,
-            OfFlags::Condition => Criterion::Condition,
-        },
-        ..DesignSettings::default()
-    };
+    let settings = design_settings(flags);
     let geometry = (&known.geometry, known.path.as_path());
     let world = CollisionWorld::new(&known.robot, geometry, &limits, &stated.surroundings)?;
     let within = Within {
@@ -258,11 +249,7 @@ fn claimed(flags: &Flags) -> Outcome<Claim> {
     let given = [&flags.model, &flags.twin, &flags.limits, &flags.config];
     let given = given.into_iter().flatten().chain(&flags.after);
     given.for_each(|path| inputs.add(path));
-    let replace = match flags.force {
-        true => Replace::Artifact,
-        false => Replace::Never,
-    };
-    Ok(Claim::new(&flags.output, replace, &inputs)?)
+    Ok(Claim::new(&flags.output, replaced(flags.force), &inputs)?)
 }
 
 /// What --config says; of a twin it says how logs of --after are read, and nothing else.
@@ -278,6 +265,20 @@ fn settings_of(flags: &Flags) -> Outcome<Settings> {
         ));
     }
     Ok(settings)
+}
+
+/// Length, rate, seed and criterion of the motion.
+fn design_settings(flags: &Flags) -> DesignSettings {
+    DesignSettings {
+        duration: flags.duration,
+        rate: flags.rate,
+        seed: flags.seed,
+        criterion: match flags.criterion {
+            OfFlags::Determinant => Criterion::Determinant,
+            OfFlags::Condition => Criterion::Condition,
+        },
+        ..DesignSettings::default()
+    }
 }
 
 /// # Errors

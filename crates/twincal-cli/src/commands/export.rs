@@ -7,7 +7,7 @@ mod torque_error;
 
 use super::summary::paragraph;
 use super::verdict::doubt;
-use super::{print_json, reads};
+use super::{print_json, reads, replaced};
 use crate::args::{Beyond as BeyondFormat, Export, ExportFormat};
 use crate::failure::{Failure, Outcome};
 use crate::progress::Progress;
@@ -22,7 +22,7 @@ use twincal::Finding;
 use twincal::evaluator::{Beyond, Evaluator, forgotten};
 use twincal::posterior::draws::draw;
 use twincal::write_back::{Holds, WriteBack, Writer};
-use twincal_io::artifact::{Artifact, Claim, Maker, OutputFile, Replace};
+use twincal_io::artifact::{Artifact, Claim, Maker, OutputFile};
 use twincal_io::export::code::{Language, source};
 use twincal_io::model::ModelFormat;
 use twincal_io::twin_json::StoredTwin;
@@ -212,17 +212,7 @@ fn code(flags: &Export, language: Language, terminal: &mut Terminal) -> Outcome<
     let stored = StoredTwin::read(&Artifact::open(&flags.twin)?, true)?;
     let output = open(flags, &stored)?;
     let twin = &stored.calibration.twin;
-    let mut about = vec![
-        format!(
-            "Calibrated torque of {}, by twincal {}.",
-            twin.robot.description().name,
-            stored.context.version
-        ),
-        format!("Nominal model {}.", stored.context.model),
-    ];
-    if twin.payload_where_unknown {
-        about.push(CARRIED.into());
-    }
+    let mut about = about(&stored);
     let forgets = forgotten(twin)?;
     about.extend(forgets.iter().map(|finding| finding.message.clone()));
     let evaluator = match flags.beyond {
@@ -236,20 +226,7 @@ fn code(flags: &Export, language: Language, terminal: &mut Terminal) -> Outcome<
                 "ONLY what the exported {} lacks: add it to that model's torque.",
                 holds.format
             ));
-            let change = Writer::new(&stored.calibration, holds)?.mean()?;
-            let robot = change.robot(&twin.robot)?;
-            let friction: Vec<f64> = (twin.robot.joint_names().iter())
-                .map(|name| {
-                    let mut joints = change.joints.iter();
-                    let own = joints.find(|joint| joint.joint == *name);
-                    own.and_then(|joint| joint.friction).unwrap_or(0.0)
-                })
-                .collect();
-            let beyond = Beyond {
-                robot: &robot,
-                friction: &friction,
-            };
-            Evaluator::new(twin, Some(beyond))?
+            evaluator_beyond(&stored, holds)?
         }
     };
     let text = source(&evaluator, language, &about)?;
@@ -285,6 +262,42 @@ fn code(flags: &Export, language: Language, terminal: &mut Terminal) -> Outcome<
         terminal.say(&shown(flags));
     }
     Ok(0)
+}
+
+/// What stands at the top of the code.
+fn about(stored: &StoredTwin) -> Vec<String> {
+    let twin = &stored.calibration.twin;
+    let mut about = vec![
+        format!(
+            "Calibrated torque of {}, by twincal {}.",
+            twin.robot.description().name,
+            stored.context.version
+        ),
+        format!("Nominal model {}.", stored.context.model),
+    ];
+    if twin.payload_where_unknown {
+        about.push(CARRIED.into());
+    }
+    about
+}
+
+/// The calculation of what an exported model lacks.
+fn evaluator_beyond(stored: &StoredTwin, holds: Holds) -> Outcome<Evaluator> {
+    let twin = &stored.calibration.twin;
+    let change = Writer::new(&stored.calibration, holds)?.mean()?;
+    let robot = change.robot(&twin.robot)?;
+    let friction: Vec<f64> = (twin.robot.joint_names().iter())
+        .map(|name| {
+            let mut joints = change.joints.iter();
+            let own = joints.find(|joint| joint.joint == *name);
+            own.and_then(|joint| joint.friction).unwrap_or(0.0)
+        })
+        .collect();
+    let beyond = Beyond {
+        robot: &robot,
+        friction: &friction,
+    };
+    Ok(Evaluator::new(twin, Some(beyond))?)
 }
 
 /// The model average.
@@ -351,13 +364,12 @@ fn draws(
             format!("give 1 to {MOST}"),
         ));
     }
-    let replace = if flags.force {
-        Replace::Artifact
-    } else {
-        Replace::Never
-    };
     let (stored, maker) = FileMaker::read(flags, kind)?;
-    let claim = Claim::new(folder, replace, &reads::of_twin(&flags.twin, &stored))?;
+    let claim = Claim::new(
+        folder,
+        replaced(flags.force),
+        &reads::of_twin(&flags.twin, &stored),
+    )?;
     let findings = doubts(&stored, terminal);
     let writer = Writer::new(&stored.calibration, kind.holds)?;
     let seed = flags.seed.unwrap_or(stored.context.seed);

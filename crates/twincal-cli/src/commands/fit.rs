@@ -3,7 +3,7 @@
 use super::calibration::{Job, Print, command, quoted, say_where, with_heldout};
 use super::inputs::{LogInput, Long, RobotInput};
 use super::open::open;
-use super::{merge, reads, settings, start_threads};
+use super::{merge, reads, replaced, settings, start_threads};
 use crate::args::{Fit, PrintFlags};
 use crate::clock::Stopwatch;
 use crate::failure::{Failure, Outcome};
@@ -12,7 +12,7 @@ use crate::progress::Progress;
 use crate::terminal::Terminal;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
-use twincal_io::artifact::{Claim, Inputs, Maker, REPORT, Replace};
+use twincal_io::artifact::{Claim, Inputs, Maker, REPORT};
 use twincal_io::config::{Config, Settings};
 
 pub(super) fn run(flags: &Fit, terminal: &mut Terminal) -> Outcome<u8> {
@@ -23,38 +23,11 @@ pub(super) fn run(flags: &Fit, terminal: &mut Terminal) -> Outcome<u8> {
         return of_statistics(flags, &config, &settings, watch, terminal);
     }
     let named = settings.log.named();
-    let given = if flags.logs.is_empty() {
-        &named
-    } else {
-        &flags.logs
-    };
-    if given.is_empty() {
-        let remedy = if flags.heldout.is_empty() {
-            "give logs, as in `twincal fit run.csv --model arm.urdf`, or [[log]] entries in the config"
-        } else {
-            "--heldout takes every path behind it: put the logs to fit before it"
-        };
-        return Err(Failure::usage("no log to fit", remedy));
-    }
+    let given = logs_to_fit(flags, &named)?;
     let Some(model) = &settings.model_file else {
         return Err(super::no_model());
     };
-    let mut inputs = Inputs::default();
-    let read = reads::Given {
-        flags: &flags.log,
-        config: &config,
-        settings: &settings,
-    };
-    reads::add_given(&mut inputs, &read, given);
-    let claim = Claim::new(
-        &settings.output,
-        if settings.force {
-            Replace::Artifact
-        } else {
-            Replace::Never
-        },
-        &inputs,
-    )?;
+    let claim = claimed(flags, &config, &settings, given)?;
     start_threads(settings.threads)?;
     let progress = Print::of(flags.print, settings.json).progress();
     progress.step(&format!("reading {}", model.to_string_lossy()));
@@ -79,6 +52,37 @@ pub(super) fn run(flags: &Fit, terminal: &mut Terminal) -> Outcome<u8> {
     };
     let progress = (flags.print, progress);
     finish(job, claim, progress, terminal)
+}
+
+/// The logs of the command, or those of the config.
+fn logs_to_fit<'a>(flags: &'a Fit, named: &'a [PathBuf]) -> Outcome<&'a [PathBuf]> {
+    let given = if flags.logs.is_empty() {
+        named
+    } else {
+        &flags.logs
+    };
+    if given.is_empty() {
+        let remedy = if flags.heldout.is_empty() {
+            "give logs, as in `twincal fit run.csv --model arm.urdf`, or [[log]] entries in the config"
+        } else {
+            "--heldout takes every path behind it: put the logs to fit before it"
+        };
+        return Err(Failure::usage("no log to fit", remedy));
+    }
+    Ok(given)
+}
+
+/// The folder of the result, which none of the inputs is in; `files` are logs, or statistics of logs.
+fn claimed(flags: &Fit, config: &Config, settings: &Settings, files: &[PathBuf]) -> Outcome<Claim> {
+    let mut inputs = Inputs::default();
+    let given = reads::Given {
+        flags: &flags.log,
+        config,
+        settings,
+    };
+    reads::add_given(&mut inputs, &given, files);
+    let replace = replaced(settings.force);
+    Ok(Claim::new(&settings.output, replace, &inputs)?)
 }
 
 /// Runs the calibration, prints it and opens its report.
@@ -106,18 +110,7 @@ fn of_statistics(
     watch: Stopwatch,
     terminal: &mut Terminal,
 ) -> Outcome<u8> {
-    let mut inputs = Inputs::default();
-    let given = reads::Given {
-        flags: &flags.log,
-        config,
-        settings,
-    };
-    reads::add_given(&mut inputs, &given, &flags.statistics);
-    let replace = match settings.force {
-        true => Replace::Artifact,
-        false => Replace::Never,
-    };
-    let claim = Claim::new(&settings.output, replace, &inputs)?;
+    let claim = claimed(flags, config, settings, &flags.statistics)?;
     start_threads(settings.threads)?;
     let progress = Print::of(flags.print, settings.json).progress();
     let (file, hashes) = merge::read(&flags.statistics, &progress)?;

@@ -2,8 +2,8 @@
 
 mod twins;
 
-use super::start_threads;
 use super::summary::{indented, paragraph};
+use super::{replaced, start_threads};
 use crate::args::Fleet as Flags;
 use crate::failure::{Failure, Outcome};
 use crate::interrupts::{Caller, require_caller};
@@ -15,7 +15,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Mutex;
 use twincal::fleet::{Fleet, FleetResult, FleetSettings, FleetStage};
-use twincal_io::artifact::{Claim, Inputs, Maker, Replace};
+use twincal_io::artifact::{Claim, Inputs, Maker};
 use twincal_io::fleet::{self, Corrected, FLEET, PAGE, fleet_json, fleet_page, reason};
 use twincal_io::statistics::{ModelFile, StatisticsFile};
 use twincal_io::words::fleet as words;
@@ -30,10 +30,7 @@ pub(super) fn run(flags: &Flags, terminal: &mut Terminal) -> Outcome<u8> {
     let settings = settings(flags)?;
     let mut inputs = Inputs::default();
     flags.files.iter().for_each(|path| inputs.add(path));
-    let replace = match flags.force {
-        true => Replace::Artifact,
-        false => Replace::Never,
-    };
+    let replace = replaced(flags.force);
     let claim = Claim::new(&flags.output, replace, &inputs)?;
     let twins = Twins::claim(flags, replace, &inputs)?;
     start_threads(flags.threads.map(|threads| threads as usize))?;

@@ -13,7 +13,7 @@ use crate::failure::Outcome;
 use crate::progress::Progress;
 use crate::terminal::{Terminal, clean};
 use serde::Serialize;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use twincal::Finding;
 use twincal::calibrate::{Outlook, outlook};
 use twincal::excitation::Unseen;
@@ -92,14 +92,8 @@ pub(super) fn run(flags: &Inspect, terminal: &mut Terminal) -> Outcome<u8> {
     let progress = Progress::new();
     // Without paths those of the config are looked at.
     let named = settings.log.named();
-    let (model, logs) = match (&settings.model_file, flags.paths.split_first()) {
-        (_, Some((first, logs))) if flags.model.is_none() && is_model(first) => (first, logs),
-        (Some(model), Some(_)) => (model, &flags.paths[..]),
-        (Some(model), None) => (model, &named[..]),
-        // Without a model by flag or config the first path is the model.
-        (None, Some((model, logs))) => (model, logs),
-        (None, None) => return Err(super::no_model()),
-    };
+    let of_config = (settings.model_file.as_deref(), &named[..]);
+    let (model, logs) = model_and_logs(flags, of_config)?;
     progress.step(&format!("reading {}", model.to_string_lossy()));
     let robot = RobotInput::read(model, &settings)?;
     let mut logs = LogInput::read(
@@ -142,6 +136,21 @@ pub(super) fn run(flags: &Inspect, terminal: &mut Terminal) -> Outcome<u8> {
         print(&inspection, terminal);
     }
     Ok(code)
+}
+
+/// The model and the logs that are looked at: the paths of the command, or what the config names.
+fn model_and_logs<'a>(
+    flags: &'a Inspect,
+    (model, named): (Option<&'a Path>, &'a [PathBuf]),
+) -> Outcome<(&'a Path, &'a [PathBuf])> {
+    match (model, flags.paths.split_first()) {
+        (_, Some((first, logs))) if flags.model.is_none() && is_model(first) => Ok((first, logs)),
+        (Some(model), Some(_)) => Ok((model, &flags.paths)),
+        (Some(model), None) => Ok((model, named)),
+        // Without a model by flag or config the first path is the model.
+        (None, Some((model, logs))) => Ok((model, logs)),
+        (None, None) => Err(super::no_model()),
+    }
 }
 
 /// What the filters would warn of, and what log and model disagree about; nothing for logs that no pipeline fits (too short, standing still): `fit` says why.
@@ -226,8 +235,18 @@ fn print(inspection: &Inspection, terminal: &mut Terminal) {
         &format!("gravity {x} {y} {z} m/s², {} links", inspection.links.len()),
         terminal,
     );
+    print_joints(&inspection.joints, terminal);
+    library::print(inspection, terminal);
+    for log in &inspection.logs {
+        print_log(log, terminal);
+    }
+    findings(&inspection.findings, Notes::Shown, terminal);
+}
+
+/// A row per joint: how it moves and what it connects.
+fn print_joints(all: &[JointRow], terminal: &mut Terminal) {
     let mut joints = table(&["joint", "coordinate", "type", "parent", "child"]);
-    for joint in &inspection.joints {
+    for joint in all {
         let coordinate = match (joint.q, &joint.mimic) {
             (Some(q), _) => format!("q{q}"),
             (None, Some(mimic)) => format!("mimics {}", clean(&mimic.joint)),
@@ -244,38 +263,38 @@ fn print(inspection: &Inspection, terminal: &mut Terminal) {
     }
     print_table(&joints, terminal);
     terminal.say("");
-    library::print(inspection, terminal);
-    for log in &inspection.logs {
-        log_heading(log, terminal);
-        let mut rows = table(&[
-            "joint",
-            "q from … to",
-            "q sd",
-            "velocity rms",
-            "torque sd",
-            "torque rms",
+}
+
+/// A row per joint of a log: where it moves, how fast, under which torque.
+fn print_log(log: &LogOverview, terminal: &mut Terminal) {
+    log_heading(log, terminal);
+    let mut rows = table(&[
+        "joint",
+        "q from … to",
+        "q sd",
+        "velocity rms",
+        "torque sd",
+        "torque rms",
+    ]);
+    for joint in &log.joints {
+        let number = |value: Option<f64>| {
+            value.map_or_else(|| "not logged".into(), |value| significant(value, 3))
+        };
+        rows.add_row([
+            &*clean(&joint.joint),
+            &format!(
+                "{} … {}",
+                significant(joint.q_range[0], 3),
+                significant(joint.q_range[1], 3)
+            ),
+            &significant(joint.q_sd, 3),
+            &significant(joint.qd_rms, 3),
+            &number(joint.tau_sd),
+            &number(joint.tau_rms),
         ]);
-        for joint in &log.joints {
-            let number = |value: Option<f64>| {
-                value.map_or_else(|| "not logged".into(), |value| significant(value, 3))
-            };
-            rows.add_row([
-                &*clean(&joint.joint),
-                &format!(
-                    "{} … {}",
-                    significant(joint.q_range[0], 3),
-                    significant(joint.q_range[1], 3)
-                ),
-                &significant(joint.q_sd, 3),
-                &significant(joint.qd_rms, 3),
-                &number(joint.tau_sd),
-                &number(joint.tau_rms),
-            ]);
-        }
-        print_table(&rows, terminal);
-        terminal.say("");
     }
-    findings(&inspection.findings, Notes::Shown, terminal);
+    print_table(&rows, terminal);
+    terminal.say("");
 }
 
 /// Name, rows, length, rate and clock of a log.

@@ -32,6 +32,7 @@ use crate::failure::{Failure, Outcome};
 use crate::terminal::Terminal;
 use serde::Serialize;
 use twincal::{Finding, Severity};
+use twincal_io::artifact::Replace;
 
 pub(crate) use summary::wrapped;
 
@@ -82,6 +83,14 @@ fn start_threads(threads: Option<usize>) -> Outcome<()> {
                 "give fewer with --threads, or raise the limits of memory (ulimit -v) and processes (ulimit -u)",
             )
         })
+}
+
+/// What a result may take the place of: with --force an earlier one.
+fn replaced(force: bool) -> Replace {
+    match force {
+        true => Replace::Artifact,
+        false => Replace::Never,
+    }
 }
 
 /// "1 log", "2 logs".

@@ -13,6 +13,7 @@ use crate::terminal::Terminal;
 use serde::Serialize;
 use std::io::{self, BufWriter, Write};
 use std::ops::{Range, RangeInclusive};
+use std::path::Path;
 use twincal::rows::{RowBlock, RowSignal, visit_rows};
 use twincal::signal::{Log, Recording, missing_torque};
 use twincal::term::Library;
@@ -49,20 +50,12 @@ pub(super) fn run(flags: &Predict, terminal: &mut Terminal) -> Outcome<u8> {
     let progress = Progress::new();
     progress.step(&format!("reading {}", flags.twin.to_string_lossy()));
     let stored = StoredTwin::read(&Artifact::open(&flags.twin)?, false)?;
-    let output = match &flags.output {
-        Some(path) => {
-            let mut inputs = reads::of_twin(&flags.twin, &stored);
-            let given = reads::Given {
-                flags: &flags.log,
-                config: &config,
-                settings: &settings,
-            };
-            reads::add_given(&mut inputs, &given, &flags.logs);
-            let output = OutputFile::create(path, flags.force, &inputs)?;
-            Some((TableFormat::of_path(path)?, path, output))
-        }
-        None => None,
+    let given = reads::Given {
+        flags: &flags.log,
+        config: &config,
+        settings: &settings,
     };
+    let output = open(flags, &stored, &given)?;
     start_threads(settings.threads)?;
     let twin = &stored.calibration.twin;
     let mut logs = LogInput::for_twin(&flags.logs, &stored, settings.log.clone(), &progress)?;
@@ -97,6 +90,21 @@ pub(super) fn run(flags: &Predict, terminal: &mut Terminal) -> Outcome<u8> {
         prediction.say(flags, terminal);
     }
     Ok(code)
+}
+
+/// Format, path and file of the rows; `None`: they go to standard output.
+fn open<'a>(
+    flags: &'a Predict,
+    stored: &StoredTwin,
+    given: &reads::Given<'_>,
+) -> Outcome<Option<(TableFormat, &'a Path, OutputFile)>> {
+    let Some(path) = &flags.output else {
+        return Ok(None);
+    };
+    let mut inputs = reads::of_twin(&flags.twin, stored);
+    reads::add_given(&mut inputs, given, &flags.logs);
+    let output = OutputFile::create(path, flags.force, &inputs)?;
+    Ok(Some((TableFormat::of_path(path)?, path, output)))
 }
 
 /// Warnings beside rows on standard output.

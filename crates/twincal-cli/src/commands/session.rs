@@ -4,7 +4,7 @@
 
 use super::calibration::{Job, command};
 use super::inputs::{LogInput, Long, RobotInput};
-use super::{fit, merge, run};
+use super::{fit, merge, replaced, run};
 use crate::args::Arguments;
 use crate::clock::Stopwatch;
 use crate::failure::{Failure, Outcome};
@@ -21,7 +21,7 @@ use twincal::Finding;
 use twincal::calibrate::{Plan, Stage, Statistics, plan};
 use twincal::robot::Robot;
 use twincal_io::artifact::{
-    Artifact, Claim, Inputs, MODEL_MJCF, MODEL_URDF, Maker, RUN_LOG, Replace, sha256,
+    Artifact, Claim, Inputs, MODEL_MJCF, MODEL_URDF, Maker, RUN_LOG, sha256,
 };
 use twincal_io::config::{Config, Settings};
 use twincal_io::log::{Column, read_columns};
@@ -320,11 +320,7 @@ impl Fitted {
     /// # Errors
     /// A folder that is there already, the system's refusal.
     pub fn save(&self, folder: &Path, force: bool) -> Outcome<()> {
-        let replace = match force {
-            true => Replace::Artifact,
-            false => Replace::Never,
-        };
-        let claim = Claim::new(folder, replace, &Inputs::default())?;
+        let claim = Claim::new(folder, replaced(force), &Inputs::default())?;
         let model = self.model.iter().cloned().collect();
         Ok((self.stored).write(claim, Maker::Fit, self.run_log.clone(), model)?)
     }

@@ -102,11 +102,7 @@ pub(super) fn run(flags: &StatisticsFlags, terminal: &mut Terminal) -> Outcome<u
     };
     road.require_folder()?;
     let plan = road.plan()?;
-    let names = display_names(&flags.logs);
-    let mut files = Vec::new();
-    for (path, name) in flags.logs.iter().zip(&names) {
-        files.push(road.log(&plan, (path, name))?);
-    }
+    let files = road.logs(&plan)?;
     let Road {
         robot_name,
         progress,
@@ -115,30 +111,37 @@ pub(super) fn run(flags: &StatisticsFlags, terminal: &mut Terminal) -> Outcome<u
     } = road;
     drop(progress);
     let code = exit::of_findings(&findings);
-    let directory = flags.output.to_string_lossy().into_owned();
+    let made = Made {
+        directory: flags.output.to_string_lossy().into_owned(),
+        plan: flags.output.join(PLAN).to_string_lossy().into_owned(),
+        robot: robot_name,
+        files,
+        findings,
+    };
     if settings.json {
-        let made = Made {
-            plan: flags.output.join(PLAN).to_string_lossy().into_owned(),
-            directory,
-            robot: robot_name,
-            files,
-            findings,
-        };
         print_json(terminal, &made)?;
     } else {
-        summary::before_the_error(&findings, terminal);
-        let made = files.iter().filter(|file| file.made).count();
-        let there = match files.len() - made {
+        made.say(terminal);
+    }
+    Ok(code)
+}
+
+impl Made {
+    /// How many files were made, and where.
+    fn say(&self, terminal: &mut Terminal) {
+        summary::before_the_error(&self.findings, terminal);
+        let made = self.files.iter().filter(|file| file.made).count();
+        let there = match self.files.len() - made {
             0 => String::new(),
             count => format!(", {count} there already"),
         };
         terminal.say(&format!(
-            "statistics of {} of robot `{robot_name}` made{there}",
-            count_of_logs(made)
+            "statistics of {} of robot `{}` made{there}",
+            count_of_logs(made),
+            self.robot
         ));
-        terminal.say(&directory);
+        terminal.say(&self.directory);
     }
-    Ok(code)
 }
 
 impl Road<'_> {
@@ -226,6 +229,15 @@ impl Road<'_> {
         };
         require_caller()?;
         Ok(output.commit(written)?)
+    }
+
+    /// The files of all logs, made where they are not there.
+    fn logs(&mut self, plan: &Plan) -> Outcome<Vec<Entry>> {
+        let flags = self.flags;
+        let names = display_names(&flags.logs);
+        (flags.logs.iter().zip(&names))
+            .map(|(path, name)| self.log(plan, (path, name)))
+            .collect()
     }
 
     /// Makes the file of a log, if it is not there.

@@ -285,6 +285,16 @@ const ALIKE: usize = 3;
 /// How many are told in full where there are more, and a place has the others.
 const TOLD: usize = 2;
 
+/// What findings of one severity say, once however many of them say it.
+struct Message<'a> {
+    code: Code,
+    /// Findings that say so.
+    count: usize,
+    /// Whom they name.
+    subjects: Vec<&'a str>,
+    text: String,
+}
+
 /// The findings of one severity as indented lines of at most `width` columns. Of many of one kind the first are told, the others
 /// named where `place` has them.
 fn lines(
@@ -293,12 +303,50 @@ fn lines(
     place: Option<&str>,
     width: usize,
 ) -> Vec<String> {
+    let messages = messages(findings, severity);
+    let mut lines = Vec::new();
+    let mut say = |text: &str| {
+        for (line, text) in wrapped(&format!("{word}: {text}"), width - 4)
+            .iter()
+            .enumerate()
+        {
+            lines.push(format!("{}{text}", if line == 0 { "  " } else { "    " }));
+        }
+    };
+    for (number, message) in messages.iter().enumerate() {
+        let kind = || {
+            messages
+                .iter()
+                .enumerate()
+                .filter(|(_, other)| other.code == message.code)
+        };
+        let before = kind().filter(|(other, _)| *other < number).count();
+        let many = kind().count() > ALIKE;
+        match place {
+            Some(place) if many && before == TOLD => {
+                let others = || kind().skip(TOLD).map(|(_, other)| other);
+                let count: usize = others().map(|other| other.count).sum();
+                let names: Vec<&str> = others().flat_map(|other| other.subjects.clone()).collect();
+                let colon = if names.is_empty() { "" } else { ": " };
+                let names = names.join(", ");
+                say(&format!(
+                    "{count} more like these two in {place}{colon}{names}"
+                ));
+            }
+            Some(_) if many && before > TOLD => {}
+            _ => say(&message.text),
+        }
+    }
+    lines
+}
+
+/// What the findings of one severity say, in their order.
+fn messages(findings: &[Finding], severity: Severity) -> Vec<Message<'_>> {
     let of_severity: Vec<_> = findings
         .iter()
         .filter(|finding| finding.severity == severity)
         .collect();
-    // Code, how many say so, whom they name, what they say.
-    let mut texts: Vec<(Code, usize, Vec<&str>, String)> = Vec::new();
+    let mut messages = Vec::new();
     for (number, finding) in of_severity.iter().enumerate() {
         let same =
             |other: &&&Finding| (&other.code, &other.message) == (&finding.code, &finding.message);
@@ -310,43 +358,14 @@ fn lines(
             .map(|finding| finding.subject.as_str())
             .filter(|subject| !subject.is_empty())
             .collect();
-        let text = format!("{}{}", about(&subjects, &finding.message), finding.message);
-        texts.push((finding.code, alike().count(), subjects, text));
+        messages.push(Message {
+            code: finding.code,
+            count: alike().count(),
+            text: format!("{}{}", about(&subjects, &finding.message), finding.message),
+            subjects,
+        });
     }
-    let mut lines = Vec::new();
-    let mut say = |text: &str| {
-        for (line, text) in wrapped(&format!("{word}: {text}"), width - 4)
-            .iter()
-            .enumerate()
-        {
-            lines.push(format!("{}{text}", if line == 0 { "  " } else { "    " }));
-        }
-    };
-    for (number, (code, _, _, text)) in texts.iter().enumerate() {
-        let kind = || {
-            texts
-                .iter()
-                .enumerate()
-                .filter(|(_, other)| other.0 == *code)
-        };
-        let before = kind().filter(|(other, _)| *other < number).count();
-        let many = kind().count() > ALIKE;
-        match place {
-            Some(place) if many && before == TOLD => {
-                let others = || kind().skip(TOLD).map(|(_, other)| other);
-                let count: usize = others().map(|other| other.1).sum();
-                let names: Vec<&str> = others().flat_map(|other| other.2.clone()).collect();
-                let colon = if names.is_empty() { "" } else { ": " };
-                let names = names.join(", ");
-                say(&format!(
-                    "{count} more like these two in {place}{colon}{names}"
-                ));
-            }
-            Some(_) if many && before > TOLD => {}
-            _ => say(text),
-        }
-    }
-    lines
+    messages
 }
 
 /// What a message is about, unless it says so itself.

@@ -505,27 +505,14 @@ fn primitive(form: &Form) -> Option<Solid> {
 /// # Errors
 /// See [`CollisionWorld::new`].
 fn check(robot: &Robot, surroundings: &Surroundings) -> Result<()> {
-    let refuse = |key: String, problem: String, remedy: String| {
-        Err(Error::from(twincal::Error::Setting {
-            key,
-            problem,
-            remedy,
-        }))
-    };
     let margin = surroundings.margin;
     if !(margin >= 0.0 && margin.is_finite()) {
-        return refuse(
-            "limits.margin".into(),
-            format!("{margin} m"),
-            "give a length from 0 on".into(),
-        );
+        let problem = format!("{margin} m");
+        return refuse("limits.margin", problem, "give a length from 0 on".into());
     }
     if let Some(height) = surroundings.floor.filter(|height| !height.is_finite()) {
-        return refuse(
-            "limits.floor".into(),
-            format!("{height} m"),
-            "give a height in m".into(),
-        );
+        let problem = format!("{height} m");
+        return refuse("limits.floor", problem, "give a height in m".into());
     }
     let known = || {
         robot
@@ -538,36 +525,40 @@ fn check(robot: &Robot, surroundings: &Surroundings) -> Result<()> {
     for name in names.chain(surroundings.ignore.iter().flatten()) {
         if !known().any(|own| own == name) {
             let problem = format!("link `{name}` is not in the model");
-            return refuse("limits".into(), problem, did_you_mean(name, known()));
+            return refuse("limits", problem, did_you_mean(name, known()));
         }
     }
-    for stated in &surroundings.boxes {
-        let (low, high) = (stated.low, stated.high);
-        let ends = low.iter().zip(&high);
-        let fits = |x: &f64| x.abs() < mesh::FARTHEST;
-        if !ends
-            .clone()
-            .all(|(low, high)| low < high && fits(low) && fits(high))
-        {
-            let problem = format!("box `{}` is from {low:?} to {high:?}", stated.name);
-            return refuse(
-                "limits.box".into(),
-                problem,
-                "give the smaller corner as `low`, in m".into(),
-            );
-        }
-        let still = |link: &&String| matches!(robot.home_of_link(link), Some((None, _)));
-        if let Some(link) = stated.links.iter().find(still) {
-            let problem = format!(
-                "box `{}` is for link `{link}`, which does not move",
-                stated.name
-            );
-            return refuse(
-                "limits.box".into(),
-                problem,
-                "name a link that moves".into(),
-            );
-        }
+    surroundings
+        .boxes
+        .iter()
+        .try_for_each(|stated| check_box(robot, stated))
+}
+
+/// A box has edges of a length that a robot may meet, and is for links that move.
+fn check_box(robot: &Robot, stated: &StatedBox) -> Result<()> {
+    let (low, high) = (stated.low, stated.high);
+    let mut ends = low.iter().zip(&high);
+    let fits = |x: &f64| x.abs() < mesh::FARTHEST;
+    if !ends.all(|(low, high)| low < high && fits(low) && fits(high)) {
+        let problem = format!("box `{}` is from {low:?} to {high:?}", stated.name);
+        let remedy = "give the smaller corner as `low`, in m".into();
+        return refuse("limits.box", problem, remedy);
+    }
+    let still = |link: &&String| matches!(robot.home_of_link(link), Some((None, _)));
+    if let Some(link) = stated.links.iter().find(still) {
+        let problem = format!(
+            "box `{}` is for link `{link}`, which does not move",
+            stated.name
+        );
+        return refuse("limits.box", problem, "name a link that moves".into());
     }
     Ok(())
+}
+
+fn refuse(key: &str, problem: String, remedy: String) -> Result<()> {
+    Err(Error::from(twincal::Error::Setting {
+        key: key.into(),
+        problem,
+        remedy,
+    }))
 }

@@ -208,10 +208,10 @@ mod tests {
     use super::super::{Config, FactorTable, LagOrAuto, TimeUnit, TorqueWord, VelocityWord};
     use super::*;
 
-    #[test]
-    fn every_key_is_read_back() {
+    /// A proposal with a value of every key, and an odd name among its joints.
+    fn proposal() -> Proposal {
         let odd = "a \"b\\\u{7}.c";
-        let proposal = Proposal {
+        Proposal {
             command: "twincal init run.csv\n[evil]".into(),
             model: "arm.urdf".into(),
             locked: BTreeMap::from([("finger".into(), 0.0), (odd.into(), 0.5)]),
@@ -251,7 +251,12 @@ mod tests {
             lag: Some((0.008, "8 ms".into())),
             velocity_from_position: Some("R² 0.5".into()),
             remarks: vec!["turn the sign of `elbow`".into()],
-        };
+        }
+    }
+
+    #[test]
+    fn every_key_is_read_back() {
+        let proposal = proposal();
         let text = proposal.text();
         assert!(
             text.lines().all(|line| line.chars().count() <= 80),

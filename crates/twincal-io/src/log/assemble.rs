@@ -198,27 +198,7 @@ impl Make {
     ) -> Result<Vec<f64>> {
         let (name, options) = (&self.name, &self.options);
         if let Some(rate) = options.rate_hz {
-            if !(rate.is_finite() && rate > 0.0) {
-                return Err(twincal::Error::Setting {
-                    key: "--rate".into(),
-                    problem: format!("{rate} Hz is out of range"),
-                    remedy: "give the sampling rate in Hz, above 0".into(),
-                }
-                .into());
-            }
-            if self.selection.time.is_some() {
-                let message = format!("time stamps were replaced by row / {rate} Hz as told");
-                findings.push(
-                    Finding::new(
-                        Severity::Note,
-                        Code::TimeReplaced,
-                        name,
-                        message,
-                        self.rows as u64,
-                    )
-                    .with([("rate", rate)]),
-                );
-            }
+            findings.extend(self.replaced_time(rate)?);
             return Ok(rows.map(|row| row as f64 / rate).collect());
         }
         let mut time = stamps.unwrap_or_default();
@@ -256,6 +236,33 @@ impl Make {
             );
         }
         Ok(time)
+    }
+
+    /// That a rate, Hz, takes the place of the time stamps, if there are any.
+    fn replaced_time(&self, rate: f64) -> Result<Option<Finding>> {
+        if !(rate.is_finite() && rate > 0.0) {
+            return Err(twincal::Error::Setting {
+                key: "--rate".into(),
+                problem: format!("{rate} Hz is out of range"),
+                remedy: "give the sampling rate in Hz, above 0".into(),
+            }
+            .into());
+        }
+        if self.selection.time.is_none() {
+            return Ok(None);
+        }
+        let message = format!("time stamps were replaced by row / {rate} Hz as told");
+        let rows = self.rows as u64;
+        Ok(Some(
+            Finding::new(
+                Severity::Note,
+                Code::TimeReplaced,
+                &self.name,
+                message,
+                rows,
+            )
+            .with([("rate", rate)]),
+        ))
     }
 }
 

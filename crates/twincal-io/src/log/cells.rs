@@ -234,6 +234,20 @@ impl Cells {
         }
     }
 
+    /// Adds a row in memory.
+    #[inline]
+    pub(super) fn push_row(&mut self, row: &[f64]) {
+        for (column, value) in self.columns.iter_mut().zip(row) {
+            column.push(*value);
+        }
+    }
+
+    /// Counts a row that cannot be read.
+    pub(super) fn drop_row(&mut self, why: &Error) {
+        self.dropped += 1;
+        self.first_dropped.get_or_insert_with(|| why.to_string());
+    }
+
     /// Bytes that `rows` of these columns take in memory at most.
     pub(crate) fn bytes_in_memory(&self, rows: f64) -> f64 {
         let bytes = rows * (self.columns.len() * BYTES) as f64;

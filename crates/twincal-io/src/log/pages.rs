@@ -35,28 +35,8 @@ pub(super) fn check_chunk(
     let mut seen = 0_i64;
     let mut buffer = Vec::new();
     while seen < values && position < length {
-        let mut found = None;
-        // Most headers are a few dozen bytes.
-        for room in [256, MAX_HEADER as u64] {
-            buffer.clear();
-            file.seek(SeekFrom::Start(start + position))
-                .map_err(|e| e.to_string())?;
-            (&mut *file)
-                .take(room.min(length - position))
-                .read_to_end(&mut buffer)
-                .map_err(|e| e.to_string())?;
-            let mut reader = Compact {
-                bytes: &buffer,
-                at: 0,
-            };
-            found = reader.page_header().map(|header| (header, reader.at));
-            if found.is_some() {
-                break;
-            }
-        }
-        let (header, size) = found
-            .ok_or_else(|| format!("the page header at byte {} is broken", start + position))?;
         let at = start + position;
+        let (header, size) = header_at(file, at, length - position, &mut buffer)?;
         if !(0..=MAX_PAGE).contains(&header.uncompressed) {
             return Err(format!(
                 "the page at byte {at} claims {} bytes, the limit is {MAX_PAGE}",
@@ -87,6 +67,35 @@ pub(super) fn check_chunk(
         ));
     }
     Ok(largest)
+}
+
+/// The page header at a byte of a file that has `left` bytes of its column chunk, and its size.
+///
+/// # Errors
+/// That it cannot be read, or is broken.
+fn header_at(
+    file: &mut (impl Read + Seek),
+    at: u64,
+    left: u64,
+    buffer: &mut Vec<u8>,
+) -> Result<(PageHeader, usize), String> {
+    // Most headers are a few dozen bytes.
+    for room in [256, MAX_HEADER as u64] {
+        buffer.clear();
+        file.seek(SeekFrom::Start(at)).map_err(|e| e.to_string())?;
+        (&mut *file)
+            .take(room.min(left))
+            .read_to_end(buffer)
+            .map_err(|e| e.to_string())?;
+        let mut reader = Compact {
+            bytes: buffer,
+            at: 0,
+        };
+        if let Some(header) = reader.page_header() {
+            return Ok((header, reader.at));
+        }
+    }
+    Err(format!("the page header at byte {at} is broken"))
 }
 
 /// A reader of the Thrift compact protocol that never allocates.

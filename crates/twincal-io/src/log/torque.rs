@@ -86,18 +86,7 @@ pub(super) fn to_joint_torque(
     findings: &mut Vec<Finding>,
 ) -> Result<()> {
     let names = robot.joint_names();
-    for (key, table) in [
-        ("gear_ratio", &options.torque.gear_ratio),
-        ("drive_constant", &options.torque.drive_constant),
-    ] {
-        if let Some(joint) = table.keys().find(|joint| !names.contains(&joint.as_str())) {
-            return Err(setting(
-                key,
-                format!("names joint `{joint}`, which does not move in the model"),
-                did_you_mean(joint, names.iter().copied()),
-            ));
-        }
-    }
+    refuse_unknown_joints(&names, options)?;
     let source = options.torque_source();
     let mut factors = Vec::new();
     for (joint, channels) in names.iter().zip(&mut recording.joints) {
@@ -107,19 +96,8 @@ pub(super) fn to_joint_torque(
         let Some(tau) = &mut channels.tau else {
             continue;
         };
-        let gear = &options.torque.gear_ratio;
-        let constant = &options.torque.drive_constant;
-        let factor = match source {
-            TorqueSource::Joint | TorqueSource::None => continue,
-            TorqueSource::Motor => of_joint("gear_ratio", gear, joint, "100.0")?,
-            TorqueSource::Current => {
-                let constant = of_joint("drive_constant", constant, joint, "0.12")?;
-                if gear.is_empty() {
-                    constant
-                } else {
-                    constant * of_joint("gear_ratio", gear, joint, "100.0")?
-                }
-            }
+        let Some(factor) = factor(joint, options)? else {
+            continue;
         };
         tau.iter_mut().for_each(|value| *value *= factor);
         factors.push(format!("{joint} {factor}"));
@@ -146,4 +124,40 @@ pub(super) fn to_joint_torque(
         ));
     }
     Ok(())
+}
+
+/// Every number is of a joint that moves in the model.
+fn refuse_unknown_joints(names: &[&str], options: &LogOptions) -> Result<()> {
+    for (key, table) in [
+        ("gear_ratio", &options.torque.gear_ratio),
+        ("drive_constant", &options.torque.drive_constant),
+    ] {
+        if let Some(joint) = table.keys().find(|joint| !names.contains(&joint.as_str())) {
+            return Err(setting(
+                key,
+                format!("names joint `{joint}`, which does not move in the model"),
+                did_you_mean(joint, names.iter().copied()),
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// Joint torque over what is logged; `None` where joint torque is logged.
+fn factor(joint: &str, options: &LogOptions) -> Result<Option<f64>> {
+    let gear = &options.torque.gear_ratio;
+    let constant = &options.torque.drive_constant;
+    let factor = match options.torque_source() {
+        TorqueSource::Joint | TorqueSource::None => return Ok(None),
+        TorqueSource::Motor => of_joint("gear_ratio", gear, joint, "100.0")?,
+        TorqueSource::Current => {
+            let constant = of_joint("drive_constant", constant, joint, "0.12")?;
+            if gear.is_empty() {
+                constant
+            } else {
+                constant * of_joint("gear_ratio", gear, joint, "100.0")?
+            }
+        }
+    };
+    Ok(Some(factor))
 }

@@ -141,19 +141,7 @@ fn joint(
     findings: &mut Vec<Finding>,
 ) -> Result<JointDescription> {
     let name = name(document, element)?;
-    let kind = match element.text("type") {
-        Some("revolute") => JointKind::Revolute,
-        Some("continuous") => JointKind::Continuous,
-        Some("prismatic") => JointKind::Prismatic,
-        Some("fixed") => JointKind::Fixed,
-        other => {
-            return Err(document.error(
-                element,
-                format!("joint `{name}` has type `{}`", shorten(other.unwrap_or(""))),
-                "twincal supports revolute, continuous, prismatic and fixed joints",
-            ));
-        }
-    };
+    let kind = kind(document, element, &name)?;
     let end = |role: &str| match document.child(element, role).and_then(|e| e.text("link")) {
         Some(link) => Ok(link.to_string()),
         None => Err(document.error(
@@ -180,18 +168,7 @@ fn joint(
         };
     }
     if let Some(mimic) = document.child(element, "mimic") {
-        let Some(other) = mimic.text("joint") else {
-            return Err(document.error(
-                mimic,
-                format!("joint `{name}` mimics nothing"),
-                "name the other joint: <mimic joint=\"…\"/>",
-            ));
-        };
-        joint.mimic = Some(Mimic {
-            joint: other.into(),
-            multiplier: document.number(mimic, "multiplier")?.unwrap_or(1.0),
-            offset: document.number(mimic, "offset")?.unwrap_or(0.0),
-        });
+        joint.mimic = Some(coupling(document, mimic, &name)?);
     }
     if let Some(dynamics) = document.child(element, "dynamics") {
         let damping = document.number(dynamics, "damping")?.unwrap_or(0.0);
@@ -202,22 +179,59 @@ fn joint(
         }
         joint.unused_friction = friction;
         if damping != 0.0 || friction != 0.0 {
-            let used = if settings.use_urdf_friction {
-                "its damping counts as nominal torque, its dry friction does not"
-            } else {
-                "not part of the nominal torque (vendors put solver values there; use_urdf_friction = true counts \
-                 the damping)"
-            };
-            let message = format!(
-                "joint `{name}`: <dynamics> states damping {damping} and friction {friction}: {used}"
-            );
-            findings.push(
-                Finding::new(Severity::Note, Code::UrdfDynamics, &name, message, 1)
-                    .with([("damping", damping), ("friction", friction)]),
-            );
+            findings.push(stated_friction(&name, damping, friction, settings));
         }
     }
     Ok(joint)
+}
+
+/// The `type` of `<joint>`.
+fn kind(document: &Document, element: &Element, joint: &str) -> Result<JointKind> {
+    match element.text("type") {
+        Some("revolute") => Ok(JointKind::Revolute),
+        Some("continuous") => Ok(JointKind::Continuous),
+        Some("prismatic") => Ok(JointKind::Prismatic),
+        Some("fixed") => Ok(JointKind::Fixed),
+        other => Err(document.error(
+            element,
+            format!(
+                "joint `{joint}` has type `{}`",
+                shorten(other.unwrap_or(""))
+            ),
+            "twincal supports revolute, continuous, prismatic and fixed joints",
+        )),
+    }
+}
+
+/// `<mimic>` of a joint.
+fn coupling(document: &Document, mimic: &Element, joint: &str) -> Result<Mimic> {
+    let Some(other) = mimic.text("joint") else {
+        return Err(document.error(
+            mimic,
+            format!("joint `{joint}` mimics nothing"),
+            "name the other joint: <mimic joint=\"…\"/>",
+        ));
+    };
+    Ok(Mimic {
+        joint: other.into(),
+        multiplier: document.number(mimic, "multiplier")?.unwrap_or(1.0),
+        offset: document.number(mimic, "offset")?.unwrap_or(0.0),
+    })
+}
+
+/// Whether damping and friction that `<dynamics>` states count as nominal torque.
+fn stated_friction(name: &str, damping: f64, friction: f64, settings: &ModelSettings) -> Finding {
+    let used = if settings.use_urdf_friction {
+        "its damping counts as nominal torque, its dry friction does not"
+    } else {
+        "not part of the nominal torque (vendors put solver values there; use_urdf_friction = true counts \
+         the damping)"
+    };
+    let message = format!(
+        "joint `{name}`: <dynamics> states damping {damping} and friction {friction}: {used}"
+    );
+    Finding::new(Severity::Note, Code::UrdfDynamics, name, message, 1)
+        .with([("damping", damping), ("friction", friction)])
 }
 
 /// A link that no joint moves by itself and whose `<inertial>` says mass 0 is a frame (of a tool, of a sensor): it weighs nothing.

@@ -183,7 +183,7 @@ impl Document {
         }
         let element = Element {
             name: tag.name().as_ref().into(),
-            attributes: attributes(file.name, file.text, offset, tag)?,
+            attributes: attributes(file, offset, tag)?,
             children: Vec::new(),
             file: self.files.len(),
             offset,
@@ -381,20 +381,8 @@ pub(crate) fn shorten(text: &str) -> String {
     }
 }
 
-/// The attributes of a tag that begins at byte `offset` of `text`.
-fn attributes(
-    name: &str,
-    text: &str,
-    offset: usize,
-    tag: &BytesStart<'_>,
-) -> Result<Vec<Attribute>> {
-    let fail = |at: usize, problem: String, remedy: &str| {
-        Err(Error::content(
-            Place::of_offset(name, text.as_bytes(), at),
-            problem,
-            remedy,
-        ))
-    };
+/// The attributes of a tag that begins at byte `offset` of a file.
+fn attributes(file: &OpenFile<'_>, offset: usize, tag: &BytesStart<'_>) -> Result<Vec<Attribute>> {
     let element = shorten(tag.name().as_ref());
     let tag_text: &str = tag;
     let mut list: Vec<Attribute> = Vec::new();
@@ -404,7 +392,7 @@ fn attributes(
             Ok(attribute) => attribute,
             Err(error) => {
                 let at = offset + 1 + attr_error_offset(&error).min(tag_text.len());
-                return fail(
+                return file.fail(
                     at,
                     format!("<{element}>: malformed attribute: {error}"),
                     "write name=\"value\"",
@@ -412,7 +400,7 @@ fn attributes(
             }
         };
         if list.len() >= MAX_ATTRIBUTES {
-            return fail(
+            return file.fail(
                 offset,
                 format!("<{element}> has more than {MAX_ATTRIBUTES} attributes"),
                 "no robot needs this: is it the right file?",
@@ -421,7 +409,7 @@ fn attributes(
         let QName(key) = attribute.key;
         let at = offset + 1 + position_in(tag_text, key);
         if list.iter().any(|a| a.name == key) {
-            return fail(
+            return file.fail(
                 at,
                 format!("<{element}> has attribute `{}` twice", shorten(key)),
                 "remove one of them",
@@ -431,7 +419,7 @@ fn attributes(
         let value = match attribute.normalized_value(XmlVersion::Implicit1_0) {
             Ok(value) => value.into_owned(),
             Err(error) => {
-                return fail(
+                return file.fail(
                     start,
                     format!("<{element}> {key}: {error}"),
                     "write the text itself",

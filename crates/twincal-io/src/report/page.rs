@@ -59,12 +59,27 @@ struct Page<'a> {
     residual_time: Option<Figure>,
     residual_state: Option<Figure>,
     autocorrelation: Option<Figure>,
+    #[serde(flatten)]
+    held_out: HeldOut,
+    compact: Vec<String>,
+    sensitivity: Option<Figure>,
+    noise: Table,
+    /// What the data leave open, a sentence each.
+    open: Vec<String>,
+    motion: Table,
+    logs: Table,
+    findings: Vec<findings::Kind>,
+    convergence: Vec<String>,
+    pipeline: Vec<String>,
+}
+
+/// What held-out rows say of the predictions.
+#[derive(Debug, Serialize)]
+struct HeldOut {
     coverage: Option<Figure>,
     pit: Option<Figure>,
     reliability: Table,
     guarantee: String,
-    compact: Vec<String>,
-    sensitivity: Option<Figure>,
     scores: Table,
     all_rows: Table,
     /// Whether some held-out rows are of joints that stand still.
@@ -74,14 +89,6 @@ struct Page<'a> {
     raw: Table,
     /// The same of moving joints; empty where none stands still.
     raw_moving: Table,
-    noise: Table,
-    /// What the data leave open, a sentence each.
-    open: Vec<String>,
-    motion: Table,
-    logs: Table,
-    findings: Vec<findings::Kind>,
-    convergence: Vec<String>,
-    pipeline: Vec<String>,
 }
 
 /// The page as HTML.
@@ -132,15 +139,7 @@ fn gather<'a>(
     run: &'a ReportContext,
     joints: &[Joint<'a>],
 ) -> Result<Page<'a>, serde_json::Error> {
-    let validation = &calibration.validation;
     let terms = &calibration.terms;
-    let independent = assess::independent_rows(calibration);
-    let pit: Vec<f64> = joints
-        .iter()
-        .flat_map(|j| &j.traces)
-        .flat_map(|t| t.pit.iter().zip(&t.standstill))
-        .filter_map(|(pit, still)| (!still).then_some(*pit))
-        .collect();
     let others = OTHER_TRACES / joints.len().max(1);
     let components = &calibration.components;
     let hero = first_screen::hero(calibration, joints);
@@ -178,13 +177,34 @@ fn gather<'a>(
         residual_time: figures::residual_time::figure(joints),
         residual_state: figures::residual_state::figure(joints),
         autocorrelation: figures::autocorrelation::figure(calibration, joints),
+        held_out: held_out(calibration, joints),
+        compact: words::compact(calibration),
+        sensitivity: figures::sensitivity::figure(terms, components),
+        noise: tables::noise(joints),
+        open: ambiguity::sentences(calibration, joints),
+        motion: tables::motion(calibration, joints),
+        logs: tables::logs(calibration),
+        findings: findings::findings(calibration),
+        convergence: tables::convergence(calibration),
+        pipeline: tables::pipeline(calibration),
+    })
+}
+
+fn held_out(calibration: &Calibration, joints: &[Joint<'_>]) -> HeldOut {
+    let validation = &calibration.validation;
+    let independent = assess::independent_rows(calibration);
+    let pit: Vec<f64> = joints
+        .iter()
+        .flat_map(|j| &j.traces)
+        .flat_map(|t| t.pit.iter().zip(&t.standstill))
+        .filter_map(|(pit, still)| (!still).then_some(*pit))
+        .collect();
+    HeldOut {
         coverage: figures::coverage::figure(&validation.coverage_levels, independent),
         // Traces may be thinned: then there are fewer values than rows.
         pit: figures::pit::figure(&pit, independent.min(pit.len() as f64)),
         reliability: honesty::reliability(validation),
         guarantee: words::guarantee(validation, &calibration.findings),
-        compact: words::compact(calibration),
-        sensitivity: figures::sensitivity::figure(terms, components),
         scores: tables::scores(assess::decisive(validation), calibration),
         all_rows: tables::scores(&validation.filtered, calibration),
         standstill: assess::has_standstill(validation),
@@ -195,12 +215,5 @@ fn gather<'a>(
             true => tables::scores(&validation.raw_moving, calibration),
             false => Table::default(),
         },
-        noise: tables::noise(joints),
-        open: ambiguity::sentences(calibration, joints),
-        motion: tables::motion(calibration, joints),
-        logs: tables::logs(calibration),
-        findings: findings::findings(calibration),
-        convergence: tables::convergence(calibration),
-        pipeline: tables::pipeline(calibration),
-    })
+    }
 }

@@ -99,22 +99,18 @@ mod tests {
         verdict
     }
 
+    /// As many held-out rows of every joint.
+    fn set_rows(calibration: &mut Calibration, rows: u64) {
+        let joints = calibration.validation.filtered.joints.iter_mut();
+        joints.for_each(|joint| joint.rows = rows);
+    }
+
     #[test]
     fn the_grade_follows_error_coverage_findings_and_convergence() {
         assert_eq!(judged(|_| ()).grade, Grade::Good);
         type Case = (fn(&mut Calibration), Grade, &'static str);
         let cases: [Case; 8] = [
-            (
-                |c| {
-                    c.validation
-                        .filtered
-                        .joints
-                        .iter_mut()
-                        .for_each(|j| j.rows = 20)
-                },
-                Grade::Care,
-                "too few",
-            ),
+            (|c| set_rows(c, 20), Grade::Care, "too few"),
             (
                 |c| {
                     c.validation.filtered.rmse_calibrated = 2.0 * c.validation.filtered.rmse_nominal
@@ -149,17 +145,7 @@ mod tests {
                 Grade::Care,
                 "exceptions",
             ),
-            (
-                |c| {
-                    c.validation
-                        .filtered
-                        .joints
-                        .iter_mut()
-                        .for_each(|j| j.rows = 0)
-                },
-                Grade::Bad,
-                "Not yet",
-            ),
+            (|c| set_rows(c, 0), Grade::Bad, "Not yet"),
             (
                 |c| {
                     c.validation.filtered.rmse_calibrated = c.validation.filtered.rmse_nominal;

@@ -4,7 +4,7 @@ use serde::Serialize;
 use twincal::Code;
 use twincal::assess::{Claim, Subject};
 use twincal::likelihood::JointNoise;
-use twincal::validate::{Split, Validation};
+use twincal::validate::{JointScore, Split, Validation};
 use twincal::words::significant;
 use twincal_io::config::Gates;
 use twincal_io::twin_json::StoredTwin;
@@ -88,7 +88,7 @@ impl<'a> Own<'a> {
 /// Two gates per joint: on rows in which it moves, where there are some here and in the twin's own scores. What holds a joint at rest no
 /// friction tells, and how long it rests is another thing in every log. Intervals of rows that were fitted are not judged: they say nothing of a change.
 pub(super) fn judge(scores: &Validation, own: &Own<'_>) -> Vec<Gate> {
-    let mut judged = Vec::new();
+    let mut gates = Vec::new();
     let stored = own.scores;
     let all = scores.filtered.joints.iter().zip(&stored.filtered.joints);
     let moving = scores.moving.joints.iter().zip(&stored.moving.joints);
@@ -97,13 +97,40 @@ pub(super) fn judge(scores: &Validation, own: &Own<'_>) -> Vec<Gate> {
             (joint, stored) if joint.rows > 0 && stored.rows > 0 => (moving, "moving rows", MOVING),
             _ => (all, "rows", ALL),
         };
-        let ratio = own.gates.rmse_ratio;
-        let (error, whose) = own.error(number, stored.rmse_calibrated, joint.rows);
+        let judged = Judged {
+            joint,
+            rows,
+            which,
+            enough: joint.rows as f64 / own.noise[number].memory() >= ENOUGH,
+        };
+        let error = own.error(number, stored.rmse_calibrated, joint.rows);
+        gates.push(judged.error_gate(own.gates.rmse_ratio, error));
+        gates.push(judged.coverage_gate(match own.fitted {
+            true => [0.0, 1.0],
+            false => own.gates.coverage,
+        }));
+    }
+    gates
+}
+
+/// Rows of a joint that are judged.
+struct Judged<'a> {
+    joint: &'a JointScore,
+    /// What they are called in sentences.
+    rows: &'static str,
+    /// See [`Gate::rows`].
+    which: &'static str,
+    /// See [`Gate::enough`].
+    enough: bool,
+}
+
+impl Judged<'_> {
+    /// The error is at most `ratio` times the one that the twin has itself, N·m, of which is said where.
+    fn error_gate(&self, ratio: f64, (error, whose): (f64, &str)) -> Gate {
         let limit = ratio * error;
-        let (rmse, name) = (joint.rmse_calibrated, &joint.joint);
-        let enough = joint.rows as f64 / own.noise[number].memory() >= ENOUGH;
-        judged.push(Gate {
-            rows: which,
+        let (rmse, name, rows) = (self.joint.rmse_calibrated, &self.joint.joint, self.rows);
+        Gate {
+            rows: self.which,
             joint: name.clone(),
             gate: "rmse",
             code: Code::ErrorAboveGate,
@@ -118,19 +145,20 @@ pub(super) fn judge(scores: &Validation, own: &Own<'_>) -> Vec<Gate> {
                 significant(limit, 4),
                 significant(error, 4),
             ),
-            enough,
-        });
-        let [low, high] = match own.fitted {
-            true => [0.0, 1.0],
-            false => own.gates.coverage,
-        };
+            enough: self.enough,
+        }
+    }
+
+    /// The 95 % interval holds a share of the rows between two limits.
+    fn coverage_gate(&self, [low, high]: [f64; 2]) -> Gate {
+        let (joint, name, rows) = (self.joint, &self.joint.joint, self.rows);
         let cautious = if joint.coverage95 > high {
             ": wider than these rows need; where that does no harm, say [check] coverage with 1 at the top"
         } else {
             ""
         };
-        judged.push(Gate {
-            rows: which,
+        Gate {
+            rows: self.which,
             joint: name.clone(),
             gate: "coverage",
             code: Code::CoverageOutsideGate,
@@ -143,10 +171,9 @@ pub(super) fn judge(scores: &Validation, own: &Own<'_>) -> Vec<Gate> {
                 percent(low),
                 percent(high)
             ),
-            enough,
-        });
+            enough: self.enough,
+        }
     }
-    judged
 }
 
 /// Which rows the twin's own error was measured on.
@@ -163,7 +190,7 @@ fn own_rows(split: &Split) -> &'static str {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use twincal::validate::{HeldOut, JointScore, Scores};
+    use twincal::validate::{HeldOut, Scores};
 
     /// One joint with this error and coverage while it moves.
     pub(in super::super) fn scores(rmse: f64, coverage: f64) -> Validation {

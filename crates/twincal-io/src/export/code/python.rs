@@ -44,28 +44,34 @@ pub(super) fn source(evaluator: &Evaluator, about: &[String]) -> String {
         list(&evaluator.torque),
         list(&evaluator.variance)
     );
-    for (j, joint) in evaluator.joints.iter().enumerate() {
-        for (k, low, high) in bounds(&joint.limits) {
-            let input = INPUTS[k];
-            let _ = writeln!(
-                out,
-                "    outside |= ~(({input}[{j}] >= {}) & ({input}[{j}] <= {}))",
-                literal(low),
-                literal(high)
-            );
-        }
-        let _ = write!(
-            out,
-            "    outside |= ~(variance[{j}] <= {})\n\
-             \x20   half[{j}] = {} * np.sqrt({} * np.maximum(variance[{j}], 0.0) + {})\n",
-            literal(joint.noise),
-            literal(evaluator.quantile),
-            literal(evaluator.ratio),
-            literal(joint.base)
-        );
+    for joint in 0..n {
+        write_joint(&mut out, evaluator, joint);
     }
     out.push_str("    return tau, tau - half, tau + half, outside\n");
     out
+}
+
+/// Whether a joint's state is outside the data, and half the width of its torque's interval.
+fn write_joint(out: &mut String, evaluator: &Evaluator, j: usize) {
+    let joint = &evaluator.joints[j];
+    for (k, low, high) in bounds(&joint.limits) {
+        let input = INPUTS[k];
+        let _ = writeln!(
+            out,
+            "    outside |= ~(({input}[{j}] >= {}) & ({input}[{j}] <= {}))",
+            literal(low),
+            literal(high)
+        );
+    }
+    let _ = write!(
+        out,
+        "    outside |= ~(variance[{j}] <= {})\n\
+         \x20   half[{j}] = {} * np.sqrt({} * np.maximum(variance[{j}], 0.0) + {})\n",
+        literal(joint.noise),
+        literal(evaluator.quantile),
+        literal(evaluator.ratio),
+        literal(joint.base)
+    );
 }
 
 fn expression(evaluator: &Evaluator, step: &Step) -> Option<String> {

@@ -149,16 +149,7 @@ fn make_acceptable(
     for (joint, child) in plan.description.joints.iter().zip(children) {
         has_joint[*child] = joint.kind != JointKind::Fixed;
     }
-    let inertias = || {
-        plan.description
-            .links
-            .iter()
-            .filter_map(|link| link.inertia)
-    };
-    let total: f64 = inertias().map(|inertia| inertia.mass).sum();
-    let traces = inertias().map(|own| (0..3).map(|k| own.tensor[k][k]).sum());
-    let largest = traces.fold(0.0_f64, f64::max);
-    let (mass, moment) = ((TINY * total).max(LEAST), (TINY * largest).max(LEAST));
+    let (mass, moment) = least_inertia(&plan.description.links);
     let (mut small, mut unused) = (Vec::new(), Vec::new());
     for (number, link) in plan.description.links.iter_mut().enumerate() {
         let Some(inertia) = link.inertia.as_mut() else {
@@ -199,6 +190,15 @@ fn make_acceptable(
         ));
     }
     Ok(())
+}
+
+/// Least mass, kg, and least moment, kg·m², of a moving link.
+fn least_inertia(links: &[LinkDescription]) -> (f64, f64) {
+    let inertias = || links.iter().filter_map(|link| link.inertia);
+    let total: f64 = inertias().map(|inertia| inertia.mass).sum();
+    let traces = inertias().map(|own| (0..3).map(|k| own.tensor[k][k]).sum());
+    let largest = traces.fold(0.0_f64, f64::max);
+    ((TINY * total).max(LEAST), (TINY * largest).max(LEAST))
 }
 
 /// Says which links got a mass, kg, or a moment, kg·m², that the model does not have.

@@ -108,6 +108,13 @@ fn want_at<'w>(
     want_at(definition, inner, &mut parts[place].1, rest)
 }
 
+/// Fields of a record or entries of a list.
+struct Entries<F> {
+    /// Kind of each.
+    kind: F,
+    count: usize,
+}
+
 /// Reads one message.
 struct Reader<'a, 'd> {
     cursor: Cursor<'a>,
@@ -227,67 +234,75 @@ impl<'a, 'd> Reader<'a, 'd> {
                 let text = self.cursor.string().ok_or_else(|| self.end())?;
                 Ok(Value::Text(String::from_utf8_lossy(text).into_owned()))
             }
-            Kind::Record(number) => {
-                let definition = self.definition;
-                let record = &definition.records[*number];
-                let mut fields = Vec::with_capacity(record.fields.len());
-                for field in &record.fields {
-                    let further: Vec<&[Step]> = (paths.iter())
-                        .filter_map(|path| match path.split_first() {
-                            Some((Step::Field(name), rest)) if *name == field.name => Some(rest),
-                            _ => None,
-                        })
-                        .collect();
-                    let says_names = match &field.kind {
-                        Kind::Text => NAMES.contains(&field.name.as_str()),
-                        Kind::List(entry, _) => **entry == Kind::Text,
-                        _ => false,
-                    };
-                    let value = if says_names || !further.is_empty() {
-                        self.value(&field.kind, &further)?
-                    } else {
-                        self.skip(&field.kind)?;
-                        Value::Other
-                    };
-                    fields.push((field.name.clone(), value));
-                }
-                Ok(Value::Record(fields))
-            }
+            Kind::Record(number) => self.record(*number, paths),
             Kind::List(entry, length) => {
                 let count = self.count(entry, *length)?;
                 if let Kind::Scalar(scalar) = **entry {
                     self.skip_numbers(scalar, count)?;
                     return Ok(Value::Numbers(count));
                 }
-                if count > MAX_LIST {
-                    return Err(format!(
-                        "it has a list of {count} entries on the way to a mapped number, the limit is {MAX_LIST}"
-                    ));
-                }
-                let further: Vec<&[Step]> = (paths.iter())
-                    .filter_map(|path| match path.split_first() {
-                        Some((Step::Field(_), _)) | None => None,
-                        Some((_, rest)) => Some(rest),
-                    })
-                    .collect();
-                let mut entries = Vec::with_capacity(count);
-                for _ in 0..count {
-                    entries.push(self.value(entry, &further)?);
-                }
-                if **entry != Kind::Text {
-                    return Ok(Value::List(entries));
-                }
-                let texts = entries.into_iter().map(|entry| match entry {
-                    Value::Text(text) => text,
-                    _ => String::new(),
-                });
-                Ok(Value::Texts(texts.collect()))
+                self.list(entry, count, paths)
             }
             other => {
                 self.skip(other)?;
                 Ok(Value::Other)
             }
         }
+    }
+
+    /// The fields of a record that the paths go through or that hold names.
+    fn record(&mut self, number: usize, paths: &[&[Step]]) -> Outcome<Value> {
+        let definition = self.definition;
+        let record = &definition.records[number];
+        let mut fields = Vec::with_capacity(record.fields.len());
+        for field in &record.fields {
+            let further: Vec<&[Step]> = (paths.iter())
+                .filter_map(|path| match path.split_first() {
+                    Some((Step::Field(name), rest)) if *name == field.name => Some(rest),
+                    _ => None,
+                })
+                .collect();
+            let says_names = match &field.kind {
+                Kind::Text => NAMES.contains(&field.name.as_str()),
+                Kind::List(entry, _) => **entry == Kind::Text,
+                _ => false,
+            };
+            let value = if says_names || !further.is_empty() {
+                self.value(&field.kind, &further)?
+            } else {
+                self.skip(&field.kind)?;
+                Value::Other
+            };
+            fields.push((field.name.clone(), value));
+        }
+        Ok(Value::Record(fields))
+    }
+
+    /// A list of `count` entries that are no numbers.
+    fn list(&mut self, entry: &Kind, count: usize, paths: &[&[Step]]) -> Outcome<Value> {
+        if count > MAX_LIST {
+            return Err(format!(
+                "it has a list of {count} entries on the way to a mapped number, the limit is {MAX_LIST}"
+            ));
+        }
+        let further: Vec<&[Step]> = (paths.iter())
+            .filter_map(|path| match path.split_first() {
+                Some((Step::Field(_), _)) | None => None,
+                Some((_, rest)) => Some(rest),
+            })
+            .collect();
+        let mut entries = Vec::with_capacity(count);
+        for _ in 0..count {
+            entries.push(self.value(entry, &further)?);
+        }
+        if *entry != Kind::Text {
+            return Ok(Value::List(entries));
+        }
+        let texts = entries.into_iter().map(|entry| match entry {
+            Value::Text(text) => text,
+            _ => String::new(),
+        });
+        Ok(Value::Texts(texts.collect()))
     }
 
     /// Follows the plan; `last` where nothing is wanted behind this part.
@@ -314,22 +329,11 @@ impl<'a, 'd> Reader<'a, 'd> {
             (Kind::Record(number), Want::Record(parts)) => {
                 let definition = self.definition;
                 let fields = &definition.records[*number].fields;
-                let mut next = 0;
-                for (at, (wanted, want)) in parts.iter().enumerate() {
-                    for field in &fields[next..*wanted] {
-                        self.skip(&field.kind)?;
-                    }
-                    next = wanted + 1;
-                    let last = last && at + 1 == parts.len();
-                    if self.walk(&fields[*wanted].kind, want, last, out)? == Walked::Changed {
-                        return Ok(Walked::Changed);
-                    }
-                }
-                if !last {
-                    for field in &fields[next..] {
-                        self.skip(&field.kind)?;
-                    }
-                }
+                let entries = Entries {
+                    kind: |at: usize| &fields[at].kind,
+                    count: fields.len(),
+                };
+                return self.walk_parts(&entries, parts, last, out);
             }
             (Kind::List(entry, length), Want::List(parts, expected)) => {
                 let count = self.count(entry, *length)?;
@@ -340,24 +344,42 @@ impl<'a, 'd> Reader<'a, 'd> {
                 if let Kind::Scalar(scalar) = **entry {
                     return self.pick(scalar, count, parts, out);
                 }
-                let mut next = 0;
-                for (at, (wanted, want)) in parts.iter().enumerate() {
-                    for _ in next..*wanted {
-                        self.skip(entry)?;
-                    }
-                    next = wanted + 1;
-                    let last = last && at + 1 == parts.len();
-                    if self.walk(entry, want, last, out)? == Walked::Changed {
-                        return Ok(Walked::Changed);
-                    }
-                }
-                if !last && self.definition.least(entry) > 0 {
-                    for _ in next..count {
-                        self.skip(entry)?;
-                    }
-                }
+                // Entries that take no bytes could be any number: none is passed over behind the parts.
+                let takes_bytes = self.definition.least(entry) > 0;
+                let entries = Entries {
+                    kind: |_: usize| &**entry,
+                    count: if takes_bytes { count } else { 0 },
+                };
+                return self.walk_parts(&entries, parts, last, out);
             }
             (kind, _) => self.skip(kind)?,
+        }
+        Ok(Walked::Whole)
+    }
+
+    /// Follows the parts of a record or a list in their order, and passes over what stands between and behind them.
+    fn walk_parts<'k>(
+        &mut self,
+        entries: &Entries<impl Fn(usize) -> &'k Kind>,
+        parts: &[(usize, Want)],
+        last: bool,
+        out: &mut [Number],
+    ) -> Outcome<Walked> {
+        let mut next = 0;
+        for (part, (wanted, want)) in parts.iter().enumerate() {
+            for at in next..*wanted {
+                self.skip((entries.kind)(at))?;
+            }
+            next = wanted + 1;
+            let last = last && part + 1 == parts.len();
+            if self.walk((entries.kind)(*wanted), want, last, out)? == Walked::Changed {
+                return Ok(Walked::Changed);
+            }
+        }
+        if !last {
+            for at in next..entries.count {
+                self.skip((entries.kind)(at))?;
+            }
         }
         Ok(Walked::Whole)
     }

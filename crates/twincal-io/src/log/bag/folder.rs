@@ -24,39 +24,55 @@ const ENDINGS: [&str; 4] = [".mcap", ".db3", ".mcap.zstd", ".db3.zstd"];
 /// [`Error::Content`] for metadata that is broken, has YAML aliases or tags, or names files outside the folder or missing; for a folder
 /// without a bag.
 pub(super) fn files(folder: &Path) -> Result<(Vec<PathBuf>, Vec<Finding>)> {
-    let name = folder.display().to_string();
     let metadata = folder.join(METADATA);
-    let system = |e: &std::io::Error| Error::system(&name, "read", e, "check its permissions");
     if metadata.exists() {
-        let place = metadata.display().to_string();
-        let text = text_of(folder, &metadata, &place)?;
-        let listed = listed_files(&place, &text)?;
-        too_many(&place, listed.len())?;
-        if listed.is_empty() {
+        return Ok((files_of_metadata(folder, &metadata)?, Vec::new()));
+    }
+    let (files, finding) = files_by_name(folder)?;
+    Ok((files, vec![finding]))
+}
+
+/// What a folder that cannot be read is refused with.
+fn unreadable(folder: &Path, error: &std::io::Error) -> Error {
+    let name = folder.display().to_string();
+    Error::system(&name, "read", error, "check its permissions")
+}
+
+/// The files that the metadata names.
+fn files_of_metadata(folder: &Path, metadata: &Path) -> Result<Vec<PathBuf>> {
+    let place = metadata.display().to_string();
+    let text = text_of(folder, metadata, &place)?;
+    let listed = listed_files(&place, &text)?;
+    too_many(&place, listed.len())?;
+    if listed.is_empty() {
+        return Err(Error::content(
+            Place::file(place),
+            "names no file in relative_file_paths",
+            "write it anew with `ros2 bag reindex`, or remove it: the files are then taken by name",
+        ));
+    }
+    let mut files = Vec::with_capacity(listed.len());
+    let mut known = BTreeSet::new();
+    for path in &listed {
+        let file = inside(folder, &place, path)?;
+        if !known.insert(file.canonicalize().map_err(|e| unreadable(folder, &e))?) {
             return Err(Error::content(
                 Place::file(place),
-                "names no file in relative_file_paths",
-                "write it anew with `ros2 bag reindex`, or remove it: the files are then taken by name",
+                format!("names the file `{path}` twice: its messages would count twice"),
+                "write it anew with `ros2 bag reindex`, or name every file once in relative_file_paths",
             ));
         }
-        let mut files = Vec::with_capacity(listed.len());
-        let mut known = BTreeSet::new();
-        for path in &listed {
-            let file = inside(folder, &place, path)?;
-            if !known.insert(file.canonicalize().map_err(|e| system(&e))?) {
-                return Err(Error::content(
-                    Place::file(place),
-                    format!("names the file `{path}` twice: its messages would count twice"),
-                    "write it anew with `ros2 bag reindex`, or name every file once in relative_file_paths",
-                ));
-            }
-            files.push(file);
-        }
-        return Ok((files, Vec::new()));
+        files.push(file);
     }
+    Ok(files)
+}
+
+/// The files of a folder without metadata that end as a bag's do, in the order of their names.
+fn files_by_name(folder: &Path) -> Result<(Vec<PathBuf>, Finding)> {
+    let name = folder.display().to_string();
     let mut files = Vec::new();
-    for entry in std::fs::read_dir(folder).map_err(|e| system(&e))? {
-        let path = entry.map_err(|e| system(&e))?.path();
+    for entry in std::fs::read_dir(folder).map_err(|e| unreadable(folder, &e))? {
+        let path = entry.map_err(|e| unreadable(folder, &e))?.path();
         let file = path
             .file_name()
             .unwrap_or_default()
@@ -81,10 +97,7 @@ pub(super) fn files(folder: &Path) -> Result<(Vec<PathBuf>, Vec<Finding>)> {
     );
     let finding = Finding::new(Severity::Warning, Code::NoMetadata, name, message, 0)
         .with([("files", files.len() as f64)]);
-    Ok((
-        files.into_iter().map(|(_, path)| path).collect(),
-        vec![finding],
-    ))
+    Ok((files.into_iter().map(|(_, path)| path).collect(), finding))
 }
 
 /// The text of the metadata, which is a file of the folder.
@@ -196,17 +209,8 @@ fn listed_files(place: &str, text: &str) -> Result<Vec<String>> {
                 format!("has more than {MAX_ITEMS} values, keys and brackets"),
             ));
         }
-        let tag = match &event {
-            Event::Alias(_) => {
-                return Err(refuse(line, "has a YAML alias, which is refused".into()));
-            }
-            Event::Scalar(_, _, _, tag)
-            | Event::SequenceStart(_, tag)
-            | Event::MappingStart(_, tag) => tag,
-            _ => &None,
-        };
-        if tag.is_some() {
-            return Err(refuse(line, "has a YAML tag, which is refused".into()));
+        if let Some(what) = unneeded(&event) {
+            return Err(refuse(line, format!("has a YAML {what}, which is refused")));
         }
         if levels.len() > MAX_DEPTH {
             return Err(refuse(line, format!("is nested deeper than {MAX_DEPTH}")));
@@ -238,6 +242,17 @@ fn listed_files(place: &str, text: &str) -> Result<Vec<String>> {
         }
     }
     Ok(files)
+}
+
+/// What of YAML no metadata needs.
+fn unneeded(event: &Event<'_>) -> Option<&'static str> {
+    match event {
+        Event::Alias(_) => Some("alias"),
+        Event::Scalar(_, _, _, Some(_))
+        | Event::SequenceStart(_, Some(_))
+        | Event::MappingStart(_, Some(_)) => Some("tag"),
+        _ => None,
+    }
 }
 
 /// A map waits for its next key once a value has ended; a map or list as a key counts as an empty one.

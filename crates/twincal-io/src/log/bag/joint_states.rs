@@ -4,12 +4,13 @@
 //! stamp belongs, if that is at most half a second and 1024 messages back; what is further back is a step of the clock and stays.
 
 mod choose;
+mod layouts;
 mod mapped;
 mod topics;
 
-use super::joint_state::{Encoding, decode};
+use super::joint_state::{Encoding, JointState, decode};
 use super::mapping::{Mapping, Schema};
-use super::merge::merge;
+use super::merge::{Chosen, merge};
 use super::part::{IN_TABLES, LISTS as PART_LISTS, Part};
 use super::path::is_source;
 use crate::error::{Error, Place, Result};
@@ -18,8 +19,9 @@ use crate::log::{
     Cells, Channel, LogOptions, MAX_NAME, Request, Selection, TorqueSource, assemble,
 };
 use crate::memory;
+use layouts::{Foreign, Layout};
 use std::borrow::Cow;
-use std::collections::{BTreeMap, HashSet};
+use std::collections::BTreeMap;
 use std::rc::Rc;
 use topics::CONVERT;
 use twincal::Code;
@@ -43,10 +45,6 @@ const LATE_SHARE: f64 = 0.01;
 const LOOK: usize = if cfg!(test) { 1 << 12 } else { 1 << 16 };
 /// Most topics of a log.
 const MAX_TOPICS: usize = 10_000;
-/// Most lists of names of one topic.
-const MAX_LAYOUTS: usize = 256;
-/// Words for the lists of a message.
-const LISTS: [&str; 3] = ["position[]", "velocity[]", "effort[]"];
 const CHANNELS: [&str; PART_LISTS] = ["position", "velocity", "effort", "acceleration"];
 
 /// A topic of a log.
@@ -65,23 +63,6 @@ struct Topic {
     messages: u64,
     layouts: Vec<Layout>,
     last: usize,
-}
-
-/// One list of names as it stands in messages.
-struct Layout {
-    names: Vec<u8>,
-    part: usize,
-    /// Which entry of the message each joint of the part is.
-    entries: Vec<usize>,
-    joints_named: usize,
-}
-
-/// Names of joints that do not move in the model.
-#[derive(Default)]
-struct Foreign {
-    /// As they came.
-    in_order: Vec<String>,
-    names: HashSet<String>,
 }
 
 /// Gathers the messages of one log.
@@ -263,53 +244,21 @@ impl<'a> JointStates<'a> {
                 return Ok(());
             }
         };
-        let names = state.names.bytes();
-        let at = match known {
-            Some(layout) if layout.names == names => topic.last,
-            _ => match topic
-                .layouts
-                .iter()
-                .position(|layout| layout.names == names)
-            {
-                Some(at) => at,
-                None => {
-                    let lengths = state.values.map(|list| list.len() > 0);
-                    let named = state.names.decode();
-                    match self.layout(id.0, number, names, &named, lengths)? {
-                        Some(at) => at,
-                        None => return Ok(()),
-                    }
-                }
-            },
+        let Some(at) = self.layout_of(id.0, &state)? else {
+            return Ok(());
         };
         self.topics[id.0].last = at;
-        let layout = &self.topics[id.0].layouts[at];
-        let part = &mut self.parts[layout.part];
-        for list in 0..3 {
-            let (found, expected) = (
-                state.values[list].len(),
-                if part.has[list] {
-                    layout.joints_named
-                } else {
-                    0
-                },
-            );
-            if found != expected {
-                let name = &self.topics[id.0].name;
-                let problem = if found == 0 || expected == 0 {
-                    format!(
-                        "message {number} on `{name}`: {} has {found} values, the messages before it had {expected}",
-                        LISTS[list]
-                    )
-                } else {
-                    format!(
-                        "message {number} on `{name}`: {} has {found} values for {} names",
-                        LISTS[list], self.topics[id.0].layouts[at].joints_named
-                    )
-                };
-                return self.unfit(problem);
-            }
+        if let Some(problem) = self.misfit(id.0, &state) {
+            return self.unfit(problem);
         }
+        self.take(id.0, log_time, &state)
+    }
+
+    /// Puts a message whose lists fit in its place among the rows of its part.
+    fn take(&mut self, topic: usize, log_time: u64, state: &JointState<'_>) -> Result<()> {
+        let topic = &self.topics[topic];
+        let layout = &topic.layouts[topic.last];
+        let part = &mut self.parts[layout.part];
         let stamp = state.stamp;
         self.lag += log_time as f64 - stamp as f64;
         let late = part.place(stamp, LATE_NS, LATE_MESSAGES);
@@ -365,73 +314,6 @@ impl<'a> JointStates<'a> {
         Err(self.refuse(problem, remedy))
     }
 
-    /// Learns a new list of names; `None` if the message is left out.
-    fn layout(
-        &mut self,
-        topic: usize,
-        number: u64,
-        bytes: &[u8],
-        named: &[String],
-        has: [bool; 3],
-    ) -> Result<Option<usize>> {
-        let name = self.topics[topic].name.clone();
-        if named.is_empty() {
-            self.unfit(format!(
-                "message {number} on `{name}`: name[] is empty, so nobody knows whose values these are"
-            ))?;
-            return Ok(None);
-        }
-        for joint in named {
-            self.refuse_long("joint", joint)?;
-        }
-        let mut before = HashSet::with_capacity(named.len());
-        if let Some(twice) = named.iter().find(|joint| !before.insert(*joint)) {
-            self.unfit(format!(
-                "message {number} on `{name}`: joint `{twice}` stands twice in name[]"
-            ))?;
-            return Ok(None);
-        }
-        if self.topics[topic].layouts.len() == MAX_LAYOUTS {
-            return Err(self.refuse(
-                format!("topic `{name}` has more than {MAX_LAYOUTS} different lists of names"),
-                "record joint states under fixed names",
-            ));
-        }
-        let (mut joints, mut entries) = (Vec::new(), Vec::new());
-        for (joint, wanted) in self.wanted.iter().enumerate() {
-            if let Some(entry) = named.iter().position(|name| name == wanted) {
-                joints.push(joint);
-                entries.push(entry);
-            }
-        }
-        let wanted: HashSet<&String> = self.wanted.iter().collect();
-        for name in named.iter().filter(|name| !wanted.contains(name)) {
-            if self.foreign.names.insert(name.clone()) {
-                self.foreign.in_order.push(name.clone());
-            }
-        }
-        let same = |(part, of): (&Part, &usize)| {
-            let alike = part.joints == joints && part.has[..3] == has;
-            *of == topic && alike && !part.mapped
-        };
-        let part = match self.parts.iter().zip(&self.part_topics).position(same) {
-            Some(part) => part,
-            None => {
-                self.parts.push(Part::new(joints, has));
-                self.part_topics.push(topic);
-                self.parts.len() - 1
-            }
-        };
-        let layouts = &mut self.topics[topic].layouts;
-        layouts.push(Layout {
-            names: bytes.to_vec(),
-            part,
-            entries,
-            joints_named: named.len(),
-        });
-        Ok(Some(layouts.len() - 1))
-    }
-
     /// The log, with all that was assumed.
     ///
     /// # Errors
@@ -443,15 +325,7 @@ impl<'a> JointStates<'a> {
     ) -> Result<(Log<'static>, Vec<Finding>)> {
         self.refuse_what_is_damaged(&findings)?;
         self.check_topics()?;
-        if self.rows == 0 {
-            let problem = match (&self.first_dropped, self.dropped) {
-                (Some(first), count) => {
-                    format!("not one of {count} messages could be read: {first}")
-                }
-                _ => "has no message of joint states".into(),
-            };
-            return Err(self.refuse(problem, "record it again, or copy it again"));
-        }
+        self.refuse_without_rows()?;
         let parts = self.choose()?;
         self.say(&mut findings);
         if let Some(mapping) = &self.mapping {
@@ -469,33 +343,7 @@ impl<'a> JointStates<'a> {
         )?;
         cells.dropped = self.dropped;
         cells.first_dropped = self.first_dropped.take();
-        let mut index = 0;
-        let mut channel = |there: bool, name: String| {
-            index += usize::from(there);
-            there.then_some(Channel { index, name })
-        };
-        let joints: Vec<[Option<Channel>; 4]> = (parts.iter().enumerate())
-            .map(|(joint, parts)| {
-                let named = |list: usize| {
-                    if let Some(words) = self.mapping.as_ref().and_then(|m| m.words(joint, list)) {
-                        return words;
-                    }
-                    let part = parts[list];
-                    let topic = part.map_or("", |part| &self.topics[self.part_topics[part]].name);
-                    format!("{topic} {}[{}]", CHANNELS[list], self.wanted[joint])
-                };
-                IN_TABLES.map(|list| channel(parts[list].is_some(), named(list)))
-            })
-            .collect();
-        let selection = Selection {
-            time: Some(Channel {
-                index: 0,
-                name: self.time_words(),
-            }),
-            joints,
-            temperatures: Vec::new(),
-            findings: Vec::new(),
-        };
+        let selection = self.selection(&parts);
         let names = self.robot.joint_names();
         if self.mapping.is_some() {
             refuse_model_torque(self.file, &names, &selection.joints, self.options)?;
@@ -520,6 +368,51 @@ impl<'a> JointStates<'a> {
         };
         let log = assemble(request, cells, selection, &mut findings)?;
         Ok((log, findings))
+    }
+
+    /// Refuses a log of whose messages none became a row.
+    fn refuse_without_rows(&self) -> Result<()> {
+        if self.rows > 0 {
+            return Ok(());
+        }
+        let problem = match (&self.first_dropped, self.dropped) {
+            (Some(first), count) => {
+                format!("not one of {count} messages could be read: {first}")
+            }
+            _ => "has no message of joint states".into(),
+        };
+        Err(self.refuse(problem, "record it again, or copy it again"))
+    }
+
+    /// The columns of the table that the chosen parts were merged into.
+    fn selection(&self, parts: &Chosen) -> Selection {
+        let mut index = 0;
+        let mut channel = |there: bool, name: String| {
+            index += usize::from(there);
+            there.then_some(Channel { index, name })
+        };
+        let joints: Vec<[Option<Channel>; 4]> = (parts.iter().enumerate())
+            .map(|(joint, parts)| {
+                let named = |list: usize| {
+                    if let Some(words) = self.mapping.as_ref().and_then(|m| m.words(joint, list)) {
+                        return words;
+                    }
+                    let part = parts[list];
+                    let topic = part.map_or("", |part| &self.topics[self.part_topics[part]].name);
+                    format!("{topic} {}[{}]", CHANNELS[list], self.wanted[joint])
+                };
+                IN_TABLES.map(|list| channel(parts[list].is_some(), named(list)))
+            })
+            .collect();
+        Selection {
+            time: Some(Channel {
+                index: 0,
+                name: self.time_words(),
+            }),
+            joints,
+            temperatures: Vec::new(),
+            findings: Vec::new(),
+        }
     }
 
     fn say(&self, findings: &mut Vec<Finding>) {

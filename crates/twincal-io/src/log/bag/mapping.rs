@@ -120,69 +120,8 @@ impl Mapping {
     pub(super) fn new(file: &str, robot: &Robot, options: &LogOptions) -> Result<Option<Self>> {
         let joints = robot.joint_names();
         let columns = &options.columns;
-        let of_topic = match &columns.temperature {
-            ChannelNames::All(text) => is_source(text),
-            ChannelNames::ByJoint(table) => table.values().any(|text| is_source(text)),
-        };
-        if of_topic {
-            return Err(refuse(
-                file,
-                "[columns] temperature names a topic: temperatures are read from tables only",
-                "leave it out for bags",
-            ));
-        }
-        let tables = [&columns.q, &columns.qd, &columns.tau, &columns.qdd];
-        let mut topics: Vec<Mapped> = Vec::new();
-        let mut add = |key: &str, list: usize, joint: usize, text: &str, all: bool| -> Result<()> {
-            let source = Source::parse(text, all).map_err(|problem| {
-                let words = format!("[columns] {key} = \"{text}\" has {problem}");
-                refuse_words(file, &words)
-            })?;
-            let target = |source| Target {
-                joint,
-                list,
-                source,
-                column: 0,
-            };
-            match topics.iter_mut().find(|topic| topic.asked == source.topic) {
-                Some(topic) => topic.targets.push(target(source)),
-                None => topics.push(Mapped {
-                    asked: source.topic.clone(),
-                    targets: vec![target(source)],
-                    time: None,
-                    log_time: false,
-                    found: None,
-                }),
-            }
-            Ok(())
-        };
-        for (list, names) in tables.into_iter().enumerate() {
-            let key = KEYS[list];
-            match names {
-                ChannelNames::ByJoint(table) => {
-                    for (joint, text) in table.iter().filter(|(_, text)| is_source(text)) {
-                        let number = joints.iter().position(|name| name == joint);
-                        let Some(number) = number else {
-                            refuse_unknown_joints(file, &joints, options)?;
-                            continue;
-                        };
-                        add(key, list, number, text, false)?;
-                    }
-                }
-                ChannelNames::All(text) if is_source(text) => {
-                    for number in 0..joints.len() {
-                        add(key, list, number, text, true)?;
-                    }
-                }
-                ChannelNames::All(text) => {
-                    return Err(refuse(
-                        file,
-                        format!("[columns] {key} = \"{text}\" names no topic of a bag"),
-                        format!("write {key} = \"/topic:field[*]\""),
-                    ));
-                }
-            }
-        }
+        refuse_temperatures(file, &columns.temperature)?;
+        let mut topics = mapped_topics(file, &joints, options)?;
         let all_q = |joint: &usize| {
             let mut targets = topics.iter().flat_map(|topic| &topic.targets);
             targets.any(|target| target.joint == *joint && target.list == 0)
@@ -231,20 +170,7 @@ impl Mapping {
         let form = form(encoding, schema).map_err(of)?;
         let time = match &form {
             Form::Binary { definition, .. } => {
-                for target in &topic.targets {
-                    check(definition, &target.source.steps, Wanted::Number).map_err(|words| {
-                        let key = KEYS[target.list];
-                        of(format!(
-                            "[columns] {key} = \"{}\": {words}",
-                            target.source.text
-                        ))
-                    })?;
-                }
-                if let Some(time) = &topic.time {
-                    check(definition, &time.steps, Wanted::Time).map_err(|words| {
-                        of(format!("[columns] time = \"{}\": {words}", time.text))
-                    })?;
-                }
+                topic.check_paths(definition).map_err(of)?;
                 let there = |steps: &[Step]| check(definition, steps, Wanted::Stamp).is_ok();
                 Some(topic.time_source(there))
             }
@@ -253,17 +179,7 @@ impl Mapping {
             }
             Form::Json => None,
         };
-        let mut joints: Vec<usize> = topic.targets.iter().map(|target| target.joint).collect();
-        joints.sort_unstable();
-        joints.dedup();
-        let mut has = [false; LISTS];
-        for target in &topic.targets {
-            has[target.list] = true;
-        }
-        let new = Part::mapped(joints, has);
-        for target in &mut topic.targets {
-            target.column = new.column(target.joint, target.list).unwrap_or(0);
-        }
+        let new = topic.new_part();
         let stamp_words = match &form {
             Form::Binary { definition, .. } => super::suggest::times(definition),
             Form::Json => String::new(),
@@ -353,80 +269,37 @@ impl Mapping {
         let stamped = stamped.filter(|found| matches!(found.time, Some(Time::Path(..))));
         let lags = stamped.map(|found| found.lag / found.messages.max(1) as f64);
         let others = lags.chain(states).fold(0.0, f64::max);
-        let beside = match others {
-            lag if lag > TOGETHER_NS => format!(
-                "; the stamps of the others are {:.3} ms before that clock on average, so that this topic may be late by as much beside them: [columns] time = \"log_time\" \
-                 takes that clock for all mapped topics",
-                lag / 1e6
-            ),
-            _ => String::new(),
-        };
         for topic in &self.topics {
             let Some(found) = topic.found.as_ref().filter(|found| found.messages > 0) else {
                 continue;
             };
-            let Reading { name, kind, .. } = found;
-            let (severity, code, message) = match &found.time {
-                Some(Time::Path(_, words)) if found.messages > 1 && !found.stamps_differ => {
-                    return Err(refuse(
-                        file,
-                        format!(
-                            "topic `{name}` ({kind}): {words} is {} s in all {} messages",
-                            found.first_stamp as f64 / 1e9,
-                            found.messages
-                        ),
-                        "take another field with [columns] time = \"/topic:field\", or the recorder's clock with [columns] time = \"log_time\"",
-                    ));
-                }
-                Some(Time::Path(_, words)) => (
-                    Severity::Note,
-                    Code::TimeSource,
-                    format!(
-                        "time on topic `{name}` is {words}, not the recorder's clock, which is later by {:.3} ms on average",
-                        found.lag / found.messages as f64 / 1e6
-                    ),
-                ),
-                _ if topic.log_time => (
-                    Severity::Warning,
-                    Code::LogTime,
-                    format!(
-                        "time on topic `{name}` is the recorder's log time, as [columns] time says: it jitters with the network and the recorder's load"
-                    ),
-                ),
-                _ => (
-                    Severity::Warning,
-                    Code::LogTime,
-                    format!(
-                        "messages on topic `{name}` ({kind}) have neither header.stamp nor stamp: time is the recorder's log time, which jitters with the network and the recorder's load{beside}; if another field holds the time, say [columns] time = \"{}:field\"{}",
-                        topic.asked, found.stamp_words
-                    ),
-                ),
-            };
-            let lag = match code {
-                Code::TimeSource => Some(("lag", found.lag / found.messages as f64 / 1e9)),
-                _ if topic.log_time || others <= TOGETHER_NS => None,
-                _ => Some(("lag_of_others", others / 1e9)),
-            };
-            findings.push(Finding::new(severity, code, file, message, 0).with(lag));
-            let ordered = found.by_name.iter().zip(&topic.targets);
-            let ordered = ordered.filter(|(by_name, _)| **by_name == Some(false));
-            let paths: BTreeSet<&str> = ordered.map(|(_, t)| t.source.text.as_str()).collect();
-            if !paths.is_empty() {
-                let message = format!(
-                    "{}: nothing in the messages says whose the entries are, so they were taken in the model's order: {}",
-                    quoted(paths),
-                    quoted(&self.joints)
-                );
-                findings.push(Finding::new(
-                    Severity::Note,
-                    Code::ModelOrder,
-                    file,
-                    message,
-                    0,
-                ));
-            }
+            found.refuse_constant_stamps(file)?;
+            findings.push(topic.source_of_time(file, found, others));
+            findings.extend(self.model_order(file, topic, found));
         }
         Ok(())
+    }
+
+    /// Entries whose joints nothing in the messages names.
+    fn model_order(&self, file: &str, topic: &Mapped, found: &Reading) -> Option<Finding> {
+        let ordered = found.by_name.iter().zip(&topic.targets);
+        let ordered = ordered.filter(|(by_name, _)| **by_name == Some(false));
+        let paths: BTreeSet<&str> = ordered.map(|(_, t)| t.source.text.as_str()).collect();
+        if paths.is_empty() {
+            return None;
+        }
+        let message = format!(
+            "{}: nothing in the messages says whose the entries are, so they were taken in the model's order: {}",
+            quoted(paths),
+            quoted(&self.joints)
+        );
+        Some(Finding::new(
+            Severity::Note,
+            Code::ModelOrder,
+            file,
+            message,
+            0,
+        ))
     }
 
     /// The times that are used, in words.
@@ -438,6 +311,82 @@ impl Mapping {
         });
         words.collect()
     }
+}
+
+/// Temperatures come from tables only.
+fn refuse_temperatures(file: &str, names: &ChannelNames) -> Result<()> {
+    let of_topic = match names {
+        ChannelNames::All(text) => is_source(text),
+        ChannelNames::ByJoint(table) => table.values().any(|text| is_source(text)),
+    };
+    if of_topic {
+        return Err(refuse(
+            file,
+            "[columns] temperature names a topic: temperatures are read from tables only",
+            "leave it out for bags",
+        ));
+    }
+    Ok(())
+}
+
+/// Topics that channels are mapped to, each with the numbers that are wanted of it.
+fn mapped_topics(file: &str, joints: &[&str], options: &LogOptions) -> Result<Vec<Mapped>> {
+    let columns = &options.columns;
+    let tables = [&columns.q, &columns.qd, &columns.tau, &columns.qdd];
+    let mut topics: Vec<Mapped> = Vec::new();
+    let mut add = |list: usize, joint: usize, text: &str, all: bool| -> Result<()> {
+        let source = Source::parse(text, all).map_err(|problem| {
+            let words = format!("[columns] {} = \"{text}\" has {problem}", KEYS[list]);
+            refuse_words(file, &words)
+        })?;
+        let target = |source| Target {
+            joint,
+            list,
+            source,
+            column: 0,
+        };
+        match topics.iter_mut().find(|topic| topic.asked == source.topic) {
+            Some(topic) => topic.targets.push(target(source)),
+            None => topics.push(Mapped {
+                asked: source.topic.clone(),
+                targets: vec![target(source)],
+                time: None,
+                log_time: false,
+                found: None,
+            }),
+        }
+        Ok(())
+    };
+    for (list, names) in tables.into_iter().enumerate() {
+        match names {
+            ChannelNames::ByJoint(table) => {
+                for (joint, text) in table.iter().filter(|(_, text)| is_source(text)) {
+                    let number = joints.iter().position(|name| name == joint);
+                    let Some(number) = number else {
+                        refuse_unknown_joints(file, joints, options)?;
+                        continue;
+                    };
+                    add(list, number, text, false)?;
+                }
+            }
+            ChannelNames::All(text) if is_source(text) => {
+                for number in 0..joints.len() {
+                    add(list, number, text, true)?;
+                }
+            }
+            ChannelNames::All(text) => return Err(refuse_no_topic(file, KEYS[list], text)),
+        }
+    }
+    Ok(topics)
+}
+
+/// A channel of `[columns]` that names a column of a table.
+fn refuse_no_topic(file: &str, key: &str, text: &str) -> Error {
+    refuse(
+        file,
+        format!("[columns] {key} = \"{text}\" names no topic of a bag"),
+        format!("write {key} = \"/topic:field[*]\""),
+    )
 }
 
 /// `[columns] time` where it is one of a bag.
@@ -480,6 +429,74 @@ impl Mapped {
             .is_some_and(|target| target.source.is_of(name))
     }
 
+    /// Compares the paths of `[columns]` with the definition of the messages.
+    ///
+    /// # Errors
+    /// The path that leads nowhere, in words.
+    fn check_paths(&self, definition: &Definition) -> std::result::Result<(), String> {
+        for target in &self.targets {
+            let source = &target.source;
+            let key = KEYS[target.list];
+            check(definition, &source.steps, Wanted::Number)
+                .map_err(|words| format!("[columns] {key} = \"{}\": {words}", source.text))?;
+        }
+        if let Some(time) = &self.time {
+            check(definition, &time.steps, Wanted::Time)
+                .map_err(|words| format!("[columns] time = \"{}\": {words}", time.text))?;
+        }
+        Ok(())
+    }
+
+    /// A part with the channels that are taken from the topic, which learn their columns of it.
+    fn new_part(&mut self) -> Part {
+        let mut joints: Vec<usize> = self.targets.iter().map(|target| target.joint).collect();
+        joints.sort_unstable();
+        joints.dedup();
+        let mut has = [false; LISTS];
+        for target in &self.targets {
+            has[target.list] = true;
+        }
+        let new = Part::mapped(joints, has);
+        for target in &mut self.targets {
+            target.column = new.column(target.joint, target.list).unwrap_or(0);
+        }
+        new
+    }
+
+    /// Which clock the topic's time is of; `others`: how much later the recorder's is than the stamps of others at most, ns.
+    fn source_of_time(&self, file: &str, found: &Reading, others: f64) -> Finding {
+        let Reading { name, kind, .. } = found;
+        let lag = found.lag / found.messages as f64;
+        if let Some(Time::Path(_, words)) = &found.time {
+            let message = format!(
+                "time on topic `{name}` is {words}, not the recorder's clock, which is later by {:.3} ms on average",
+                lag / 1e6
+            );
+            return Finding::new(Severity::Note, Code::TimeSource, file, message, 0)
+                .with([("lag", lag / 1e9)]);
+        }
+        let warning =
+            |message: String| Finding::new(Severity::Warning, Code::LogTime, file, message, 0);
+        if self.log_time {
+            return warning(format!(
+                "time on topic `{name}` is the recorder's log time, as [columns] time says: it jitters with the network and the recorder's load"
+            ));
+        }
+        let behind = Some(others).filter(|lag| *lag > TOGETHER_NS);
+        let beside = behind.map_or_else(String::new, |lag| {
+            format!(
+                "; the stamps of the others are {:.3} ms before that clock on average, so that this topic may be late by as much beside them: [columns] time = \"log_time\" \
+                 takes that clock for all mapped topics",
+                lag / 1e6
+            )
+        });
+        warning(format!(
+            "messages on topic `{name}` ({kind}) have neither header.stamp nor stamp: time is the recorder's log time, which jitters with the network and the recorder's load{beside}; if another field holds the time, say [columns] time = \"{}:field\"{}",
+            self.asked, found.stamp_words
+        ))
+        .with(behind.map(|lag| ("lag_of_others", lag / 1e9)))
+    }
+
     /// The config's time, else the message's own stamp where it is `there`, else the recorder's.
     fn time_source(&self, there: impl Fn(&[Step]) -> bool) -> Time {
         if self.log_time {
@@ -497,6 +514,25 @@ impl Mapped {
             }
         }
         Time::Log
+    }
+}
+
+impl Reading {
+    /// Refuses stamps that nobody filled in.
+    fn refuse_constant_stamps(&self, file: &str) -> Result<()> {
+        let Self { name, kind, .. } = self;
+        match &self.time {
+            Some(Time::Path(_, words)) if self.messages > 1 && !self.stamps_differ => Err(refuse(
+                file,
+                format!(
+                    "topic `{name}` ({kind}): {words} is {} s in all {} messages",
+                    self.first_stamp as f64 / 1e9,
+                    self.messages
+                ),
+                "take another field with [columns] time = \"/topic:field\", or the recorder's clock with [columns] time = \"log_time\"",
+            )),
+            _ => Ok(()),
+        }
     }
 }
 

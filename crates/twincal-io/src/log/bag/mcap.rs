@@ -97,27 +97,67 @@ pub(super) fn read(
         unchecked: false,
     };
     let end = reader.records(source)?;
-    let mut findings = Vec::new();
-    if reader.damaged > 0 {
-        let message = format!(
-            "{} of {} chunks are damaged and were left out with their messages; the first: {}; record or copy the file again",
-            reader.damaged,
-            reader.chunks,
-            reader.first_damage.unwrap_or_default()
-        );
-        findings.push(
-            Finding::new(
+    Ok(reader.damage().into_iter().chain(end.cut(file)).collect())
+}
+
+/// How a file ends.
+enum End {
+    Whole,
+    BehindData,
+    Cut(u64),
+}
+
+impl End {
+    /// That the file is not whole.
+    fn cut(&self, file: &str) -> Option<Finding> {
+        let (severity, message, byte) = match self {
+            Self::Whole => return None,
+            Self::BehindData => (
+                Severity::Warning,
+                "the file ends behind its messages, without its index; none was lost".to_owned(),
+                None,
+            ),
+            Self::Cut(byte) => (
                 Severity::Degraded,
-                Code::DamagedChunks,
-                file,
-                message,
-                reader.damaged,
-            )
-            .with([("chunks", reader.chunks as f64)]),
-        );
+                format!(
+                    "the file is cut off at byte {byte}: what stood whole before was read; `mcap recover` makes a whole file of it"
+                ),
+                Some(("byte", *byte as f64)),
+            ),
+        };
+        Some(Finding::new(severity, Code::Truncated, file, message, 0).with(byte))
     }
-    if reader.damaged == 0 && reader.is_changed {
-        let (severity, values) = match reader.unchecked {
+}
+
+impl Reader<'_, '_> {
+    fn refuse(&self, problem: String, remedy: &str) -> Error {
+        refusal(self.file, problem, remedy)
+    }
+
+    /// Chunks that were left out, or bytes that were changed where no chunk shows it.
+    fn damage(&self) -> Option<Finding> {
+        if self.damaged > 0 {
+            let message = format!(
+                "{} of {} chunks are damaged and were left out with their messages; the first: {}; record or copy the file again",
+                self.damaged,
+                self.chunks,
+                self.first_damage.as_deref().unwrap_or_default()
+            );
+            return Some(
+                Finding::new(
+                    Severity::Degraded,
+                    Code::DamagedChunks,
+                    self.file,
+                    message,
+                    self.damaged,
+                )
+                .with([("chunks", self.chunks as f64)]),
+            );
+        }
+        if !self.is_changed {
+            return None;
+        }
+        let (severity, values) = match self.unchecked {
             true => (Severity::Degraded, "values may be wrong"),
             false => (
                 Severity::Warning,
@@ -127,38 +167,13 @@ pub(super) fn read(
         let message = format!(
             "some bytes of the file were changed, its checksum over all data is wrong: {values}; copy the file again"
         );
-        findings.push(Finding::new(severity, Code::DamagedData, file, message, 1));
-    }
-    let cut = match end {
-        End::Whole => None,
-        End::BehindData => Some((
-            Severity::Warning,
-            "the file ends behind its messages, without its index; none was lost".to_owned(),
-            None,
-        )),
-        End::Cut(byte) => Some((
-            Severity::Degraded,
-            format!(
-                "the file is cut off at byte {byte}: what stood whole before was read; `mcap recover` makes a whole file of it"
-            ),
-            Some(("byte", byte as f64)),
-        )),
-    };
-    if let Some((severity, message, byte)) = cut {
-        findings.push(Finding::new(severity, Code::Truncated, file, message, 0).with(byte));
-    }
-    Ok(findings)
-}
-
-enum End {
-    Whole,
-    BehindData,
-    Cut(u64),
-}
-
-impl Reader<'_, '_> {
-    fn refuse(&self, problem: String, remedy: &str) -> Error {
-        refusal(self.file, problem, remedy)
+        Some(Finding::new(
+            severity,
+            Code::DamagedData,
+            self.file,
+            message,
+            1,
+        ))
     }
 
     /// All records of the file, one by one; how it ends.

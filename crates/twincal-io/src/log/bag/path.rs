@@ -428,9 +428,13 @@ mod tests {
                 .unwrap_err()
                 .contains("p/Other")
         );
+    }
+
+    #[test]
+    fn a_name_leads_nowhere_where_messages_hold_no_names() {
         let bare = Definition::parse("p/S", "float64[] q", Encoding::Cdr).unwrap();
         let source = Source::parse("/s:q[elbow]", false).unwrap();
-        let problem = super::check(&bare, &source.steps, Wanted::Number).unwrap_err();
+        let problem = check(&bare, &source.steps, Wanted::Number).unwrap_err();
         assert!(
             problem.contains("is called `elbow`: no list of texts"),
             "{problem}"

@@ -90,13 +90,7 @@ impl<R: Read> Table<R> {
         chapters: bool,
     ) -> Result<Cells> {
         let mut cells = Cells::new(wanted.len(), chapters);
-        // Fields in file order with the column of `cells` they go to.
-        let mut order: Vec<(usize, usize)> = wanted
-            .iter()
-            .enumerate()
-            .map(|(to, &from)| (from, to))
-            .collect();
-        order.sort_unstable();
+        let order = in_file_order(wanted);
         let mut row = vec![0.0; wanted.len()];
         let mut next = self.first.take();
         let (mut rows, mut text) = (0_u64, 0_u64);
@@ -131,27 +125,14 @@ impl<R: Read> Table<R> {
                 self.lines.give_back(line);
             }
             match read {
-                Ok(()) => {
-                    for (column, value) in cells.columns.iter_mut().zip(&row) {
-                        column.push(*value);
-                    }
-                }
-                Err(error) if lenient => {
-                    cells.dropped += 1;
-                    cells.first_dropped.get_or_insert_with(|| error.to_string());
-                }
+                Ok(()) => cells.push_row(&row),
+                Err(error) if lenient => cells.drop_row(&error),
                 Err(error) => return Err(error),
             }
             rows += 1;
             text += taken as u64;
             if rows == 1000 {
-                let expected = self.bytes as f64 * rows as f64 / text as f64;
-                // Columns that grow again and again are copied again and again.
-                let bytes = cells.bytes_in_memory(1.01 * expected);
-                self.check_memory(bytes)?;
-                for column in &mut cells.columns {
-                    column.reserve(bytes as usize / 8 / wanted.len().max(1));
-                }
+                self.reserve(&mut cells, self.bytes as f64 * rows as f64 / text as f64)?;
             }
             if rows.is_multiple_of(SETTLE) {
                 cells.settle(&self.name)?;
@@ -181,15 +162,22 @@ impl<R: Read> Table<R> {
         findings
     }
 
-    /// Refuses what will not fit before it is allocated: rows are estimated from the first 1000.
-    fn check_memory(&self, bytes: f64) -> Result<()> {
+    /// Makes room for as many rows as are `expected` after a look at the first 1000; what will not fit is refused before it is allocated.
+    fn reserve(&self, cells: &mut Cells, expected: f64) -> Result<()> {
+        // Columns that grow again and again are copied again and again.
+        let bytes = cells.bytes_in_memory(1.01 * expected);
         // Where the estimate falls short, growing vectors hold up to three times their content while they move.
         let needed = 3.0 * bytes;
         memory::require(
             &self.name,
             needed as u64,
             "read a shorter log, or one with fewer columns",
-        )
+        )?;
+        let columns = cells.columns.len().max(1);
+        for column in &mut cells.columns {
+            column.reserve(bytes as usize / 8 / columns);
+        }
+        Ok(())
     }
 
     /// One line to numbers, in the order of the wanted columns.
@@ -242,32 +230,48 @@ impl<R: Read> Table<R> {
                 hint,
             ));
         }
-        if let Some((column, offset)) = bad {
-            let before = String::from_utf8_lossy(&line.text[..offset])
-                .chars()
-                .count() as u64;
-            let place = Place {
-                file: self.name.clone(),
-                line: Some(line.number),
-                column: Some(before + 1),
-            };
-            let shown: String = self
-                .dialect
-                .field_text(&line.text, offset)
-                .chars()
-                .take(40)
-                .collect();
-            return Err(Error::content(
-                place,
-                format!(
-                    "`{shown}` in column `{}` is not a number",
-                    self.header[column]
-                ),
-                "fix the cell (leave it empty if there is no value), or drop and count such rows with --lenient",
-            ));
+        match bad {
+            Some((column, offset)) => Err(self.not_a_number(line, column, offset)),
+            None => Ok(()),
         }
-        Ok(())
     }
+
+    /// The error for a field of a wanted column that begins at byte `offset` of its line.
+    fn not_a_number(&self, line: &lines::Line, column: usize, offset: usize) -> Error {
+        let before = String::from_utf8_lossy(&line.text[..offset])
+            .chars()
+            .count() as u64;
+        let place = Place {
+            file: self.name.clone(),
+            line: Some(line.number),
+            column: Some(before + 1),
+        };
+        let shown: String = self
+            .dialect
+            .field_text(&line.text, offset)
+            .chars()
+            .take(40)
+            .collect();
+        Error::content(
+            place,
+            format!(
+                "`{shown}` in column `{}` is not a number",
+                self.header[column]
+            ),
+            "fix the cell (leave it empty if there is no value), or drop and count such rows with --lenient",
+        )
+    }
+}
+
+/// Wanted fields in the order of the file, each with the column of the cells that it goes to.
+fn in_file_order(wanted: &[usize]) -> Vec<(usize, usize)> {
+    let mut order: Vec<(usize, usize)> = wanted
+        .iter()
+        .enumerate()
+        .map(|(to, &from)| (from, to))
+        .collect();
+    order.sort_unstable();
+    order
 }
 
 #[cfg(test)]

@@ -86,15 +86,7 @@ fn equality<'a>(tree: &mut Tree<'a>, joints: &Joints, element: &'a Element) -> R
     if view.flag("active") == Some(false) {
         return Ok(());
     }
-    let mut poly = [0.0, 1.0, 0.0, 0.0, 0.0];
-    if let Some(attribute) = element.get("polycoef") {
-        for (slot, value) in poly
-            .iter_mut()
-            .zip(tree.document.number_list(element, attribute)?)
-        {
-            *slot = value;
-        }
-    }
+    let poly = polynomial(tree, element)?;
     if let ("joint", Some(first), Some(second)) = (
         element.name.as_str(),
         element.text("joint1"),
@@ -142,6 +134,20 @@ fn equality<'a>(tree: &mut Tree<'a>, joints: &Joints, element: &'a Element) -> R
         1,
     ));
     Ok(())
+}
+
+/// Coefficients of an equality, from the constant one on.
+fn polynomial(tree: &Tree<'_>, element: &Element) -> Result<[f64; 5]> {
+    let mut poly = [0.0, 1.0, 0.0, 0.0, 0.0];
+    if let Some(attribute) = element.get("polycoef") {
+        for (slot, value) in poly
+            .iter_mut()
+            .zip(tree.document.number_list(element, attribute)?)
+        {
+            *slot = value;
+        }
+    }
+    Ok(poly)
 }
 
 /// Rotor inertia and damping that an actuator adds to its joint: gear² times its own. A gear other than 1 is said: columns

@@ -77,21 +77,7 @@ impl<'a> Defaults<'a> {
             let mut open: Vec<(&'a Element, &'a str)> = vec![(section, defaults.main)];
             while let Some((element, name)) = open.pop() {
                 let mut entries = defaults.classes.get(name).cloned().unwrap_or_default();
-                let mut nested = Vec::new();
-                for &child in &element.children {
-                    let child = &document.elements[child];
-                    if child.name == "default" {
-                        nested.push(child);
-                        continue;
-                    }
-                    let by_attribute = entries.entry(kind(&child.name)).or_default();
-                    for attribute in &child.attributes {
-                        by_attribute
-                            .entry(&attribute.name)
-                            .or_default()
-                            .push((child, attribute));
-                    }
-                }
+                let nested = add_stated(document, element, &mut entries);
                 stated += (1 + nested.len()) * size(&entries);
                 if stated > MAX_STATED {
                     return Err(document.error(
@@ -155,6 +141,30 @@ impl<'a> Defaults<'a> {
             )),
         }
     }
+}
+
+/// Adds what a class states to its entries; the classes that are nested in it.
+fn add_stated<'a>(
+    document: &'a Document,
+    class: &'a Element,
+    entries: &mut Entries<'a>,
+) -> Vec<&'a Element> {
+    let mut nested = Vec::new();
+    for &child in &class.children {
+        let child = &document.elements[child];
+        if child.name == "default" {
+            nested.push(child);
+            continue;
+        }
+        let by_attribute = entries.entry(kind(&child.name)).or_default();
+        for attribute in &child.attributes {
+            by_attribute
+                .entry(&attribute.name)
+                .or_default()
+                .push((child, attribute));
+        }
+    }
+    nested
 }
 
 /// An element with the attributes that its class adds.

@@ -43,6 +43,24 @@ pub(super) fn inertia(
     if kind == "plane" || kind == "hfield" {
         return Ok(None);
     }
+    refuse_unknown_inertia(view, kind, body)?;
+    let (size, place) = shape(compiler, view, kind, body)?;
+    let solid = solid(kind, size);
+    let mass = stated.unwrap_or(density.unwrap_or(WATER) * solid.volume);
+    let place = outer.compose(&place);
+    let mut tensor: Matrix = [[0.0; 3]; 3];
+    for k in 0..3 {
+        tensor[k][k] = mass * solid.radii[k];
+    }
+    Ok(Some(Inertia {
+        mass,
+        com: place.translation,
+        tensor: rotate_tensor(&place.rotation, &tensor),
+    }))
+}
+
+/// Refuses shapes that have no closed form here: meshes and shells.
+fn refuse_unknown_inertia(view: &View<'_, '_>, kind: &str, body: &str) -> Result<()> {
     if !["sphere", "capsule", "cylinder", "box", "ellipsoid"].contains(&kind)
         || view.get("mesh").is_some()
     {
@@ -65,19 +83,7 @@ pub(super) fn inertia(
             "twincal computes solid bodies only: give the body an <inertial>",
         );
     }
-    let (size, place) = shape(compiler, view, kind, body)?;
-    let solid = solid(kind, size);
-    let mass = stated.unwrap_or(density.unwrap_or(WATER) * solid.volume);
-    let place = outer.compose(&place);
-    let mut tensor: Matrix = [[0.0; 3]; 3];
-    for k in 0..3 {
-        tensor[k][k] = mass * solid.radii[k];
-    }
-    Ok(Some(Inertia {
-        mass,
-        com: place.translation,
-        tensor: rotate_tensor(&place.rotation, &tensor),
-    }))
+    Ok(())
 }
 
 /// Half sizes (as MuJoCo means them) and placement in the body.

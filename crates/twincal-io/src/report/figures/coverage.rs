@@ -24,18 +24,7 @@ pub(in crate::report) fn figure(levels: &[(f64, f64)], independent_rows: f64) ->
         (100.0 * low, 102.0),
     );
     let mut svg = Svg::new(HALF, height);
-    let band: Vec<_> = (0..=40)
-        .map(|i| {
-            let p = low + (1.0 - low) * f64::from(i) / 40.0;
-            let half = 1.96 * (p * (1.0 - p) / independent_rows.max(1.0)).sqrt();
-            (
-                100.0 * p,
-                100.0 * (p - half).max(low),
-                100.0 * (p + half).min(1.0),
-            )
-        })
-        .collect();
-    panel.band(&mut svg, "still", &band);
+    panel.band(&mut svg, "still", &chance(low, independent_rows));
     panel.axes(&mut svg, "promised (%)", "observed (%)");
     svg.line(
         "half",
@@ -71,4 +60,19 @@ pub(in crate::report) fn figure(levels: &[(f64, f64)], independent_rows: f64) ->
         ],
         images: vec![Image::half("", svg.finish(&format!("Coverage of predictive intervals: {}.", words.join("; "))))],
     })
+}
+
+/// Where 95 % of the observed shares (%) lie if intervals hold what they promise, from the level `low` on.
+fn chance(low: f64, independent_rows: f64) -> Vec<(f64, f64, f64)> {
+    (0..=40)
+        .map(|i| {
+            let p = low + (1.0 - low) * f64::from(i) / 40.0;
+            let half = 1.96 * (p * (1.0 - p) / independent_rows.max(1.0)).sqrt();
+            (
+                100.0 * p,
+                100.0 * (p - half).max(low),
+                100.0 * (p + half).min(1.0),
+            )
+        })
+        .collect()
 }

@@ -113,6 +113,18 @@ pub(super) fn left<'a>(width: f64, mut names: impl Iterator<Item = &'a str>) -> 
     }
 }
 
+/// The chart while its rows are drawn.
+struct Chart {
+    svg: Svg,
+    /// From probabilities to pixels.
+    x: Scale,
+    width: f64,
+    left: f64,
+    right: f64,
+    /// Names stand above their bars.
+    stacked: bool,
+}
+
 fn draw(rows: &[Row<'_>], width: f64, label: &str) -> String {
     let names = rows.iter().filter_map(|row| match row {
         Row::Term(term, _) => Some(term.name.as_str()),
@@ -131,59 +143,20 @@ fn draw(rows: &[Row<'_>], width: f64, label: &str) -> String {
         svg.line("g", (x.at(value), top), (x.at(value), bottom));
         svg.text("t", (x.at(value), bottom + 15.0), Anchor::Middle, &text);
     }
+    let mut chart = Chart {
+        svg,
+        x,
+        width,
+        left,
+        right,
+        stacked,
+    };
     let mut next = top;
     for row in rows {
-        let mut y = next;
+        chart.row(row, next);
         next += height(row);
-        let mut base = y + 13.5;
-        match row {
-            Row::Family(name) => {
-                svg.rect("strip", (0.0, y + 2.0), (width, ROW - 2.0), None);
-                svg.text(
-                    "l strong",
-                    (4.0, base),
-                    Anchor::Start,
-                    &shorten(name, width - 8.0, 11.0),
-                );
-            }
-            Row::Rest(n) => {
-                let text = format!("{} more, each below {LEAST}", count(*n as u64));
-                svg.text("t", (left + 4.0, base), Anchor::Start, &text);
-            }
-            Row::Term(term, pip) => {
-                let class = if term.is_in() { "kept" } else { "left" };
-                let hint = format!("{}: {}", term.name, probability(*pip));
-                if stacked {
-                    let name = shorten(&term.name, width - left, 12.0);
-                    svg.text("name", (left, base), Anchor::Start, &name);
-                    (y, base) = (y + ABOVE, base + ABOVE);
-                } else {
-                    let name = shorten(&term.name, left - 12.0, 12.0);
-                    svg.text("name", (left - 6.0, base), Anchor::End, &name);
-                }
-                // A bar of one pixel shows that there is a candidate.
-                svg.rect(
-                    class,
-                    (left, y + 4.0),
-                    ((x.at(*pip) - left).max(1.0), ROW - 6.0),
-                    Some(&hint),
-                );
-                if let Some(error) = term.pip_mcse.filter(|e| *e > 0.0) {
-                    let ends = [(pip - 1.96 * error).max(0.0), (pip + 1.96 * error).min(1.0)];
-                    svg.line(
-                        "whisker",
-                        (x.at(ends[0]), y + 10.0),
-                        (x.at(ends[1]), y + 10.0),
-                    );
-                }
-                svg.text("t", (right + 6.0, base), Anchor::Start, &probability(*pip));
-                if stacked {
-                    // Not through the names.
-                    svg.line("half", (x.at(0.5), y + 3.0), (x.at(0.5), y + ROW - 1.0));
-                }
-            }
-        }
     }
+    let mut svg = chart.svg;
     if !stacked {
         svg.line("half", (x.at(0.5), top), (x.at(0.5), bottom));
     }
@@ -195,6 +168,73 @@ fn draw(rows: &[Row<'_>], width: f64, label: &str) -> String {
         "inclusion probability",
     );
     svg.finish(label)
+}
+
+impl Chart {
+    /// A row that begins at `y`.
+    fn row(&mut self, row: &Row<'_>, y: f64) {
+        let base = y + 13.5;
+        match row {
+            Row::Family(name) => {
+                self.svg
+                    .rect("strip", (0.0, y + 2.0), (self.width, ROW - 2.0), None);
+                self.svg.text(
+                    "l strong",
+                    (4.0, base),
+                    Anchor::Start,
+                    &shorten(name, self.width - 8.0, 11.0),
+                );
+            }
+            Row::Rest(n) => {
+                let text = format!("{} more, each below {LEAST}", count(*n as u64));
+                self.svg
+                    .text("t", (self.left + 4.0, base), Anchor::Start, &text);
+            }
+            Row::Term(term, pip) => self.candidate(term, *pip, (y, base)),
+        }
+    }
+
+    /// Name, bar and probability of a candidate; its row begins at `y`, its name stands on `base`.
+    fn candidate(&mut self, term: &ComponentSummary, pip: f64, (mut y, mut base): (f64, f64)) {
+        let Self {
+            svg,
+            x,
+            width,
+            left,
+            right,
+            stacked,
+        } = self;
+        let class = if term.is_in() { "kept" } else { "left" };
+        let hint = format!("{}: {}", term.name, probability(pip));
+        if *stacked {
+            let name = shorten(&term.name, *width - *left, 12.0);
+            svg.text("name", (*left, base), Anchor::Start, &name);
+            (y, base) = (y + ABOVE, base + ABOVE);
+        } else {
+            let name = shorten(&term.name, *left - 12.0, 12.0);
+            svg.text("name", (*left - 6.0, base), Anchor::End, &name);
+        }
+        // A bar of one pixel shows that there is a candidate.
+        svg.rect(
+            class,
+            (*left, y + 4.0),
+            ((x.at(pip) - *left).max(1.0), ROW - 6.0),
+            Some(&hint),
+        );
+        if let Some(error) = term.pip_mcse.filter(|e| *e > 0.0) {
+            let ends = [(pip - 1.96 * error).max(0.0), (pip + 1.96 * error).min(1.0)];
+            svg.line(
+                "whisker",
+                (x.at(ends[0]), y + 10.0),
+                (x.at(ends[1]), y + 10.0),
+            );
+        }
+        svg.text("t", (*right + 6.0, base), Anchor::Start, &probability(pip));
+        if *stacked {
+            // Not through the names.
+            svg.line("half", (x.at(0.5), y + 3.0), (x.at(0.5), y + ROW - 1.0));
+        }
+    }
 }
 
 #[cfg(test)]

@@ -32,22 +32,7 @@ pub(in crate::report) fn figure(pit: &[f64], independent_rows: f64) -> Option<Fi
         "share of rows (%)",
     );
     panel.band(&mut svg, "still", &[(0.0, low, high), (1.0, low, high)]);
-    for (i, share) in shares.iter().enumerate() {
-        let corner = panel.at(i as f64 * flat, 100.0 * share);
-        let opposite = panel.at((i + 1) as f64 * flat, 0.0);
-        let hint = format!(
-            "{:.2} to {:.2}: {}",
-            i as f64 * flat,
-            (i + 1) as f64 * flat,
-            percent(*share)
-        );
-        svg.rect(
-            "bar",
-            (corner.0 + 0.8, corner.1),
-            (opposite.0 - corner.0 - 1.6, opposite.1 - corner.1),
-            Some(&hint),
-        );
-    }
+    bars(&mut svg, &panel, &shares, flat);
     // Over the bars its ends alone: a band would turn the colour of what stands below it.
     for (class, height) in [("a", low), ("a", high), ("half", 100.0 * flat)] {
         svg.line(class, panel.at(0.0, height), panel.at(1.0, height));
@@ -68,6 +53,26 @@ pub(in crate::report) fn figure(pit: &[f64], independent_rows: f64) -> Option<Fi
         ],
         images: vec![Image::half("", svg.finish(&label))],
     })
+}
+
+/// A bar of `width` per share.
+fn bars(svg: &mut Svg, panel: &Panel, shares: &[f64], width: f64) {
+    for (i, share) in shares.iter().enumerate() {
+        let corner = panel.at(i as f64 * width, 100.0 * share);
+        let opposite = panel.at((i + 1) as f64 * width, 0.0);
+        let hint = format!(
+            "{:.2} to {:.2}: {}",
+            i as f64 * width,
+            (i + 1) as f64 * width,
+            percent(*share)
+        );
+        svg.rect(
+            "bar",
+            (corner.0 + 0.8, corner.1),
+            (opposite.0 - corner.0 - 1.6, opposite.1 - corner.1),
+            Some(&hint),
+        );
+    }
 }
 
 /// Shares of the values in equal bins over [0, 1]; `None` without a finite value.

@@ -148,6 +148,14 @@ fn worst_window(trace: &Trace) -> Range<usize> {
     best..best + size
 }
 
+/// Lines and band of a range of a trace, broken at pauses.
+struct Curves {
+    measured: Vec<(f64, f64)>,
+    nominal: Vec<(f64, f64)>,
+    calibrated: Vec<(f64, f64)>,
+    band: Vec<(f64, f64, f64)>,
+}
+
 fn draw(
     joint: &Joint<'_>,
     trace: &Trace,
@@ -157,26 +165,12 @@ fn draw(
     height: f64,
 ) -> String {
     let time = &trace.time[range.clone()];
-    let part = |values: &[f64]| -> Vec<(f64, f64)> {
-        with_gaps(
-            time.iter().copied().zip(
-                values[range.start.min(values.len())..range.end.min(values.len())]
-                    .iter()
-                    .copied(),
-            ),
-        )
-    };
-    let (measured, nominal, calibrated) = (
-        part(&trace.measured),
-        part(&trace.nominal),
-        part(&trace.calibrated),
-    );
-    let (low, high) = (part(&trace.low), part(&trace.high));
-    let band: Vec<_> = low
-        .iter()
-        .zip(&high)
-        .map(|(l, h)| (l.0, l.1, h.1))
-        .collect();
+    let Curves {
+        measured,
+        nominal,
+        calibrated,
+        band,
+    } = Curves::of(trace, &range);
     let y = torque_range(&[&measured, &nominal, &calibrated], &band);
     let frame = Frame::inside(width, height, y);
     let panel = Panel::new(frame, extent(time.iter().copied()), y);
@@ -213,7 +207,38 @@ fn draw(
     panel.line(&mut svg, "n", thin(&nominal, buckets));
     panel.line(&mut svg, "m", thin(&measured, buckets));
     panel.line(&mut svg, "c", thin(&calibrated, buckets));
-    svg.finish(&format!(
+    svg.finish(&label(joint, trace))
+}
+
+impl Curves {
+    fn of(trace: &Trace, range: &Range<usize>) -> Self {
+        let time = &trace.time[range.clone()];
+        let part = |values: &[f64]| -> Vec<(f64, f64)> {
+            with_gaps(
+                time.iter().copied().zip(
+                    values[range.start.min(values.len())..range.end.min(values.len())]
+                        .iter()
+                        .copied(),
+                ),
+            )
+        };
+        let (low, high) = (part(&trace.low), part(&trace.high));
+        Self {
+            measured: part(&trace.measured),
+            nominal: part(&trace.nominal),
+            calibrated: part(&trace.calibrated),
+            band: low
+                .iter()
+                .zip(&high)
+                .map(|(l, h)| (l.0, l.1, h.1))
+                .collect(),
+        }
+    }
+}
+
+/// What the chart shows, in words for readers who do not see it.
+fn label(joint: &Joint<'_>, trace: &Trace) -> String {
+    format!(
         "Line chart over time of the torque of joint {} in {}: measured, nominal (error {} {unit}) and calibrated \
          (error {} {unit}) with its 95 % interval{}.",
         joint.name,
@@ -225,7 +250,7 @@ fn draw(
             false => "",
         },
         unit = joint.units.torque,
-    ))
+    )
 }
 
 /// All lines, and the band as far as it does not squeeze the lines to less than half of the height.

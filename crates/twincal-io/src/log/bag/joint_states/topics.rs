@@ -1,7 +1,7 @@
 //! Which topics there are, in words, and which of them cannot be told apart.
 
 use super::{JointStates, KINDS, Topic};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use twincal::robot::did_you_mean;
 use twincal::words::{NAMED, listed, quoted, shortened};
 use twincal::{Finding, Severity};
@@ -31,6 +31,32 @@ impl JointStates<'_> {
                 return Ok(());
             }
         }
+        self.check_asked()?;
+        if self.ambiguous {
+            return Err(self.ambiguity());
+        }
+        if !self.topics.iter().any(|topic| topic.read_as.is_some()) {
+            let list = self.list(|_| true);
+            if list.is_empty() {
+                return Err(self.refuse("has no topic at all", CONVERT));
+            }
+            if self.mapping.is_some() {
+                return Ok(());
+            }
+            let (lists, remedy) = self.suggestions();
+            return Err(self.refuse(
+                format!(
+                    "has no topic with {} in CDR; it has {list}{lists}",
+                    KINDS[0]
+                ),
+                remedy,
+            ));
+        }
+        Ok(())
+    }
+
+    /// Topics that `[[log]] topic` names are there and hold joint states.
+    fn check_asked(&self) -> Result<()> {
         for asked in &self.options.topics {
             let found = self.topics.iter().find(|topic| topic.name == *asked);
             if let Some(topic) = found.filter(|topic| topic.read_as.is_none()) {
@@ -54,40 +80,25 @@ impl JointStates<'_> {
                 ));
             }
         }
-        if self.ambiguous {
-            let list = self.list(|topic| topic.read_as.is_some() && topic.messages > 0);
-            let names: Vec<String> = (self.topics.iter())
-                .filter(|topic| topic.read_as.is_some() && topic.messages > 0)
-                .take(NAMED)
-                .map(|topic| format!("{:?}", topic.name))
-                .collect();
-            return Err(self.refuse(
-                format!("has joint states on more than one topic: {list}"),
-                format!(
-                    "say which with [[log]] topic = {}; if they complete each other, say topic = [{}], and each joint's channel comes from the first that has it",
-                    names.first().map_or("", String::as_str),
-                    names.join(", ")
-                ),
-            ));
-        }
-        if !self.topics.iter().any(|topic| topic.read_as.is_some()) {
-            let list = self.list(|_| true);
-            if list.is_empty() {
-                return Err(self.refuse("has no topic at all", CONVERT));
-            }
-            if self.mapping.is_some() {
-                return Ok(());
-            }
-            let (lists, remedy) = self.suggestions();
-            return Err(self.refuse(
-                format!(
-                    "has no topic with {} in CDR; it has {list}{lists}",
-                    KINDS[0]
-                ),
-                remedy,
-            ));
-        }
         Ok(())
+    }
+
+    /// The error for joint states on several topics of which none is named.
+    fn ambiguity(&self) -> Error {
+        let list = self.list(|topic| topic.read_as.is_some() && topic.messages > 0);
+        let names: Vec<String> = (self.topics.iter())
+            .filter(|topic| topic.read_as.is_some() && topic.messages > 0)
+            .take(NAMED)
+            .map(|topic| format!("{:?}", topic.name))
+            .collect();
+        self.refuse(
+            format!("has joint states on more than one topic: {list}"),
+            format!(
+                "say which with [[log]] topic = {}; if they complete each other, say topic = [{}], and each joint's channel comes from the first that has it",
+                names.first().map_or("", String::as_str),
+                names.join(", ")
+            ),
+        )
     }
 
     pub(super) fn list(&self, which: impl Fn(&Topic) -> bool) -> String {
