@@ -276,14 +276,7 @@ impl Predictor {
                     correction[lane] += joint.mean[i] * column[lane];
                 }
             }
-            let still = |row: usize| input.standstill.get(row).copied().unwrap_or(false);
-            let band: Lane = std::array::from_fn(|lane| {
-                if still(row_of(lane)) {
-                    joint.coulomb
-                } else {
-                    0.0
-                }
-            });
+            let band: Lane = std::array::from_fn(|lane| joint.stiction(input, row_of(lane)));
             let spread: Lane = std::array::from_fn(|lane| joint.spread(input, row_of(lane)));
             let constant =
                 |row: usize| input.nominal[row] + input.products.get(row).copied().unwrap_or(0.0);
@@ -332,6 +325,15 @@ impl Joint {
     fn spread(&self, input: &JointInput<'_>, row: usize) -> f64 {
         let velocity = input.motion[1].get(row);
         velocity.map_or(1.0, |v| self.spread.at(*v, input.nominal[row]))
+    }
+
+    /// Torque that stiction holds either way in a row, N·m; 0 where the joint moves.
+    fn stiction(&self, input: &JointInput<'_>, row: usize) -> f64 {
+        if input.standstill.get(row).copied().unwrap_or(false) {
+            self.coulomb
+        } else {
+            0.0
+        }
     }
 
     fn leaves_hull(&self, input: &JointInput<'_>, row: usize) -> bool {
