@@ -41,27 +41,7 @@ impl Law {
         if model.sites.is_empty() {
             return plain(matched);
         }
-        // A = L Lᵀ − Σ precision a aᵀ, A μ = L Lᵀ mean − Σ shift a.
-        let lower = matched.lower();
-        let mut matrix = vec![0.0; count * count];
-        let mut mean = vec![0.0; count];
-        for i in 0..count {
-            for k in 0..count {
-                let value: f64 = (0..=i.min(k))
-                    .map(|j| lower[i * count + j] * lower[k * count + j])
-                    .sum();
-                matrix[i * count + k] = value;
-                mean[i] += value * model.mean[k];
-            }
-        }
-        for site in &model.sites {
-            for (i, f) in site.direction() {
-                for (k, g) in site.direction() {
-                    matrix[i * count + k] -= site.precision * f * g;
-                }
-                mean[i] -= site.shift * f;
-            }
-        }
+        let (matrix, mut mean) = without_sites(model, &matched);
         let Ok(factor) = Cholesky::new(&matrix, count) else {
             return plain(matched);
         };
@@ -181,6 +161,33 @@ impl Law {
         let pairs = from.iter().zip(beta);
         pairs.map(|(from, to)| from + share * (to - from)).collect()
     }
+}
+
+/// A and A μ of a model, without the sites that its matched normal holds.
+fn without_sites(model: &Model, matched: &Cholesky) -> (Vec<f64>, Vec<f64>) {
+    let count = model.members.len();
+    // A = L Lᵀ − Σ precision a aᵀ, A μ = L Lᵀ mean − Σ shift a.
+    let lower = matched.lower();
+    let mut matrix = vec![0.0; count * count];
+    let mut mean = vec![0.0; count];
+    for i in 0..count {
+        for k in 0..count {
+            let value: f64 = (0..=i.min(k))
+                .map(|j| lower[i * count + j] * lower[k * count + j])
+                .sum();
+            matrix[i * count + k] = value;
+            mean[i] += value * model.mean[k];
+        }
+    }
+    for site in &model.sites {
+        for (i, f) in site.direction() {
+            for (k, g) in site.direction() {
+                matrix[i * count + k] -= site.precision * f * g;
+            }
+            mean[i] -= site.shift * f;
+        }
+    }
+    (matrix, mean)
 }
 
 #[cfg(test)]

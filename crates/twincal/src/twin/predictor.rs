@@ -283,13 +283,7 @@ impl Predictor {
             let residual: Option<Lane> = (!input.measured.is_empty()).then(|| {
                 std::array::from_fn(|lane| input.measured[row_of(lane)] - constant(row_of(lane)))
             });
-            let Bands {
-                low,
-                high,
-                epistemic,
-                pit,
-                density,
-            } = arch.dispatch(Group {
+            let bands: Bands = arch.dispatch(Group {
                 constants,
                 scratch: &mut scratch,
                 x: &x,
@@ -302,17 +296,17 @@ impl Predictor {
                 let constant = constant(row);
                 torque.nominal.push(input.nominal[row]);
                 torque.calibrated.push(constant + correction[lane]);
-                torque.low.push(constant + low[lane]);
-                torque.high.push(constant + high[lane]);
-                torque.epistemic.push(epistemic[lane].sqrt());
+                torque.low.push(constant + bands.low[lane]);
+                torque.high.push(constant + bands.high[lane]);
+                torque.epistemic.push(bands.epistemic[lane].sqrt());
                 let noise = noise(spread[lane]);
                 torque.noise.push(noise.sqrt());
                 let new_motion = joint.leaves_hull(input, row);
                 torque.new_motion.push(new_motion);
-                (torque.extrapolating).push(new_motion || epistemic[lane] > noise);
+                (torque.extrapolating).push(new_motion || bands.epistemic[lane] > noise);
                 if residual.is_some() {
-                    torque.pit.push(pit[lane]);
-                    torque.log_density.push(density[lane].ln());
+                    torque.pit.push(bands.pit[lane]);
+                    torque.log_density.push(bands.density[lane].ln());
                 }
             }
         }

@@ -118,26 +118,7 @@ impl HeldOut {
             if whole {
                 said.extend(without_incidents(twin, &mut trajectory));
             }
-            let signal = RowSignal::Filtered;
-            let slices = slices(
-                &twin.pipeline,
-                &trajectory,
-                signal,
-                f64::NEG_INFINITY,
-                usize::MAX,
-            );
-            visit_slices(
-                &twin.robot,
-                library,
-                &twin.pipeline,
-                &trajectory,
-                signal,
-                &slices,
-                &mut |block| {
-                    self.push_filtered(block, predictor.into(), &mut collected);
-                    Ok(())
-                },
-            )?;
+            self.push_part((twin, library, predictor), &trajectory, &mut collected)?;
             seen(&trajectory)?;
             Ok(trajectory)
         };
@@ -164,6 +145,35 @@ impl HeldOut {
             predictor,
             &trajectory,
             f64::NEG_INFINITY,
+        )
+    }
+
+    /// The filtered rows of a log or of one of its chapters.
+    fn push_part(
+        &mut self,
+        (twin, library, predictor): (&Twin, &Library, &Predictor),
+        trajectory: &Trajectory,
+        collected: &mut Collected,
+    ) -> Result<()> {
+        let signal = RowSignal::Filtered;
+        let slices = slices(
+            &twin.pipeline,
+            trajectory,
+            signal,
+            f64::NEG_INFINITY,
+            usize::MAX,
+        );
+        visit_slices(
+            &twin.robot,
+            library,
+            &twin.pipeline,
+            trajectory,
+            signal,
+            &slices,
+            &mut |block| {
+                self.push_filtered(block, predictor.into(), collected);
+                Ok(())
+            },
         )
     }
 
