@@ -69,6 +69,29 @@ struct Collected {
     stretches: Vec<Vec<f64>>,
 }
 
+impl Collected {
+    /// Adds the rows of one joint of a block.
+    fn extend(&mut self, joint: usize, block: &RowBlock<'_>, torque: &JointTorque) {
+        let rows = &block.joints[joint];
+        let own = joint * block.len..(joint + 1) * block.len;
+        let (measured, standstill) = (rows.measured, rows.standstill);
+        self.stretches[joint].extend(measured.iter().enumerate().map(|(row, &y)| {
+            stretch(torque.low[row], torque.calibrated[row], torque.high[row], y)
+        }));
+        self.traces[joint].extend(
+            self.rows,
+            &TraceRows {
+                time: block.time,
+                q: &block.q[own.clone()],
+                qd: &block.qd[own],
+                measured,
+                standstill,
+                torque,
+            },
+        );
+    }
+}
+
 impl HeldOut {
     /// Nothing seen yet, for joints of these names.
     pub fn new(joints: impl IntoIterator<Item = impl Into<String>>) -> Self {
@@ -288,7 +311,6 @@ impl HeldOut {
         let friction: Option<Vec<JointTorque>> = predictors.friction.map(rival);
         for (joint, torque) in torques.iter().enumerate() {
             let rows = &block.joints[joint];
-            let own = joint * block.len..(joint + 1) * block.len;
             let (measured, standstill) = (rows.measured, rows.standstill);
             self.filtered.push(joint, measured, torque);
             self.moving
@@ -321,20 +343,7 @@ impl HeldOut {
                 self.rivals
                     .push(measured, torque, &compact[joint], |row| !standstill[row]);
             }
-            collected.stretches[joint].extend(measured.iter().enumerate().map(|(row, &y)| {
-                stretch(torque.low[row], torque.calibrated[row], torque.high[row], y)
-            }));
-            collected.traces[joint].extend(
-                collected.rows,
-                &TraceRows {
-                    time: block.time,
-                    q: &block.q[own.clone()],
-                    qd: &block.qd[own],
-                    measured,
-                    standstill,
-                    torque,
-                },
-            );
+            collected.extend(joint, block, torque);
         }
         collected.rows += block.len;
     }
