@@ -83,6 +83,7 @@ impl Interval {
     fn what_counts(&self, acting: &Acting, joint: usize) -> (Vec<usize>, f64, Vec<f64>) {
         let (columns, x) = (&acting.which, &acting.torque);
         let c = |i: usize, k: usize| self.coordinates.covariance(columns[i], columns[k]);
+        // Over the coordinates that are still there.
         let mut along = self.along(acting);
         let mut full = vec![0.0; 2 * STATES];
         for (x, along) in x.iter().zip(&along) {

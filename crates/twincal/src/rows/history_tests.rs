@@ -13,6 +13,8 @@ const R: f64 = 5e-3;
 const FRICTION: f64 = 1.5;
 const COLD: f64 = 0.6;
 const CONSTANT: f64 = 7.0;
+/// Mean of the warmth over the training logs.
+const MEAN: f64 = 0.3;
 
 /// Two sines per joint, 1 kHz; `order`: derivative.
 fn wave(order: i32) -> Vec<f64> {
@@ -70,6 +72,63 @@ fn log() -> Recording {
     }
 }
 
+/// Coefficients that the columns of the element and of its warmth have.
+fn coefficients(library: &Library) -> Vec<f64> {
+    (library.columns().iter())
+        .map(
+            |&term| match library.terms()[term].name.rsplit('.').next() {
+                Some("stop2") => FRICTION,
+                Some("coulomb") if library.terms()[term].family == Family::WarmUp => COLD,
+                Some("coulomb") => FRICTION + COLD * MEAN,
+                _ => 0.0,
+            },
+        )
+        .collect()
+}
+
+/// A pipeline that knows the element's thresholds and the time in which joints warm up.
+fn pipeline(motion_interval: f64) -> Pipeline {
+    let history = JointHistory {
+        thresholds: vec![1.5e-3, R, 15e-3],
+        warmth: Some(Warmth::Time {
+            constant: CONSTANT,
+            mean: MEAN,
+            later_mean: 0.2,
+        }),
+    };
+    Pipeline {
+        cutoff_hz: 5.0,
+        motion_cutoff_hz: 20.0,
+        rate_hz: 12.5,
+        motion_interval,
+        coulomb_velocity: 0.02,
+        standstill_velocity: vec![0.02; DOF],
+        derived_from: vec![DerivedFrom::Velocity; DOF],
+        history: vec![history; DOF],
+        ..Pipeline::off(DOF)
+    }
+}
+
+/// Adds a block's columns row by row, so that blocks do not matter; the most torque that these coefficients leave once all is known.
+fn left(block: &RowBlock<'_>, coefficients: &[f64], all: &mut Vec<f64>) -> f64 {
+    let mut worst = 0.0_f64;
+    for row in 0..block.len {
+        for rows in &block.joints {
+            let own = all.len();
+            let columns = 0..rows.columns.len();
+            all.extend(columns.map(|i| rows.x[i * rows.stride + row]));
+            let columns = rows.columns.iter().zip(&all[own..]);
+            let explained: f64 = columns.map(|(&k, x)| coefficients[k] * x).sum();
+            let left = rows.measured[row] - rows.nominal[row] - explained;
+            if block.time[row] > 101.0 {
+                worst = worst.max(left.abs());
+                assert!(!rows.standstill[row], "known by then");
+            }
+        }
+    }
+    worst
+}
+
 /// Truth: the element itself. The column of r = 5 mrad has all of the Coulomb friction, warmth is `e^(−t/T)` less its mean.
 #[test]
 fn an_element_that_bends_and_slips_is_explained_by_its_column() {
@@ -80,62 +139,20 @@ fn an_element_that_bends_and_slips_is_explained_by_its_column() {
         ..LibrarySettings::default()
     };
     let library = Library::propose(&robot, &settings).unwrap().0;
-    let mean = 0.3;
-    let truth: Vec<f64> = (library.columns().iter())
-        .map(
-            |&term| match library.terms()[term].name.rsplit('.').next() {
-                Some("stop2") => FRICTION,
-                Some("coulomb") if library.terms()[term].family == Family::WarmUp => COLD,
-                Some("coulomb") => FRICTION + COLD * mean,
-                _ => 0.0,
-            },
-        )
-        .collect();
+    let truth = coefficients(&library);
     let log = log();
-    let history = JointHistory {
-        thresholds: vec![1.5e-3, R, 15e-3],
-        warmth: Some(Warmth::Time {
-            constant: CONSTANT,
-            mean,
-            later_mean: 0.2,
-        }),
-    };
     for motion_interval in [0.0, 0.007] {
-        let pipeline = Pipeline {
-            cutoff_hz: 5.0,
-            motion_cutoff_hz: 20.0,
-            rate_hz: 12.5,
-            motion_interval,
-            coulomb_velocity: 0.02,
-            standstill_velocity: vec![0.02; DOF],
-            derived_from: vec![DerivedFrom::Velocity; DOF],
-            history: vec![history.clone(); DOF],
-            ..Pipeline::off(DOF)
-        };
+        let pipeline = pipeline(motion_interval);
         let (trajectory, _) = prepare(&robot, &log, &pipeline)
             .unwrap()
             .align(&pipeline, Raw::All)
             .unwrap();
         for signal in [RowSignal::Filtered, RowSignal::Raw] {
-            // Row by row, so that blocks do not matter.
             let numbers = |most: usize| {
                 let slices = slices(&pipeline, &trajectory, signal, f64::NEG_INFINITY, most);
                 let (mut all, mut worst) = (Vec::new(), 0.0_f64);
                 let mut look = |block: &RowBlock<'_>| {
-                    for row in 0..block.len {
-                        for rows in &block.joints {
-                            let own = all.len();
-                            let columns = 0..rows.columns.len();
-                            all.extend(columns.map(|i| rows.x[i * rows.stride + row]));
-                            let columns = rows.columns.iter().zip(&all[own..]);
-                            let explained: f64 = columns.map(|(&k, x)| truth[k] * x).sum();
-                            let left = rows.measured[row] - rows.nominal[row] - explained;
-                            if block.time[row] > 101.0 {
-                                worst = worst.max(left.abs());
-                                assert!(!rows.standstill[row], "known by then");
-                            }
-                        }
-                    }
+                    worst = worst.max(left(block, &truth, &mut all));
                     Ok(())
                 };
                 visit_slices(

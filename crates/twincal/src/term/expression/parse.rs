@@ -363,9 +363,7 @@ impl Parser<'_> {
                 remedy,
             ));
         }
-        let kinds: [(&str, fn(usize) -> Variable); 2] =
-            [("qd", Variable::Velocity), ("q", Variable::Position)];
-        for (prefix, variable) in kinds {
+        for prefix in ["qd", "q"] {
             let Some(digits) = index(prefix) else {
                 continue;
             };
@@ -375,8 +373,9 @@ impl Parser<'_> {
                 .ok()
                 .filter(|i| (1..=n).contains(i) && !digits.starts_with('0'));
             return match joint {
-                Some(joint) => Ok(Some(variable(joint - 1))),
                 None => Err(self.no_joint(start, name, prefix)),
+                Some(joint) if prefix == "qd" => Ok(Some(Variable::Velocity(joint - 1))),
+                Some(joint) => Ok(Some(Variable::Position(joint - 1))),
             };
         }
         Ok(None)
