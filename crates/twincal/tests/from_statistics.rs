@@ -3,8 +3,8 @@
 use crate::two_link;
 use twincal::Code;
 use twincal::calibrate::{
-    Calibration, CalibrationSettings, FromTables, Plan, Quantity, Record, Statistics, calibrate,
-    calibrate_statistics, plan,
+    Calibration, CalibrationSettings, FromTables, Plan, Quantity, Record, Statistics, Stopped,
+    calibrate, calibrate_statistics, plan,
 };
 use twincal::prelude::*;
 use twincal::random::Random;
@@ -495,6 +495,7 @@ fn a_held_out_copy_is_named() {
 /// passes 12 standard deviations with probability below 1e-12.
 #[test]
 fn a_log_whose_torque_is_scaled_is_named_as_by_the_fit_to_the_logs() {
+    let plan = study(4).plan();
     for odd in [None, Some(1), Some(3)] {
         let mut study = study(4);
         if let Some(odd) = odd {
@@ -505,16 +506,17 @@ fn a_log_whose_torque_is_scaled_is_named_as_by_the_fit_to_the_logs() {
         }
         let (fitted, heldout) = study.logs.split_at(3);
         let settings = &study.settings;
-        let (plan, _) = plan(&study.robot, fitted, settings, &|_| {}).expect("a plan");
         let sum = study.merged(&plan, 0..3);
-        let own = calibrate_statistics(&sum, heldout, settings, &|_| {}).expect("a fit");
-        let whole = calibrate(&study.robot, fitted, heldout, settings, &|_| {}).expect("a fit");
-        let of_torque = |fit: &Calibration| -> Vec<Finding> {
+        let own = calibrate_statistics(&sum, heldout, settings, &|_| {});
+        let whole = calibrate(&study.robot, fitted, heldout, settings, &|_| {});
+        // A fit to one such log may be refused: what was found says why.
+        let of_torque = |fit: std::result::Result<Calibration, Stopped>| -> Vec<Finding> {
+            let findings = fit.map_or_else(|stopped| stopped.findings, |fit| fit.findings);
             let odd = [Code::LogTorqueFactor, Code::JointTorqueFactor];
-            let all = fit.findings.iter().cloned();
+            let all = findings.into_iter();
             all.filter(|own| odd.contains(&own.code)).collect()
         };
-        let (own, whole) = (of_torque(&own), of_torque(&whole));
+        let (own, whole) = (of_torque(own), of_torque(whole));
         assert_eq!(own, whole);
         let named: Vec<&str> = own.iter().map(|own| own.subject.as_str()).collect();
         let expected = odd.map(|log| format!("log{log}"));

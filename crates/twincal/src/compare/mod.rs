@@ -324,6 +324,16 @@ impl Side {
         (0..DRAWS).map(holds).collect()
     }
 
+    /// `count` parameters of a component, draw by draw; all 0 where the twin does not know it.
+    fn table(&self, component: Option<usize>, count: usize) -> Vec<Vec<f64>> {
+        let Some(component) = component else {
+            return vec![vec![0.0; count]; DRAWS];
+        };
+        let columns = self.columns(component);
+        let row = |row| self.values(component, &columns, row);
+        (0..DRAWS).map(row).collect()
+    }
+
     /// Parameters of a component in one draw; all 0 where it is not in.
     fn values(&self, component: usize, columns: &[Option<usize>], row: usize) -> Vec<f64> {
         let value = |column: &Option<usize>| {
@@ -354,17 +364,7 @@ fn change(
         [None, component] => (&sides[1].library, component?),
     };
     let parameters = library.parameters(component);
-    let table = [0, 1].map(|side: usize| -> Vec<Vec<f64>> {
-        let rows = 0..DRAWS;
-        match at[side] {
-            Some(component) => {
-                let columns = sides[side].columns(component);
-                rows.map(|row| sides[side].values(component, &columns, row))
-                    .collect()
-            }
-            None => rows.map(|_| vec![0.0; parameters.len()]).collect(),
-        }
-    });
+    let table = [0, 1].map(|side: usize| sides[side].table(at[side], parameters.len()));
     let table = without_rounding(table, &parameters);
     // A payload's first moments are its mass and centre once more.
     let twice = |name: &str| {

@@ -433,6 +433,17 @@ mod tests {
         spline
     }
 
+    /// Splines whose free points are moved by so much of a direction.
+    fn moved(splines: &[Spline], direction: &[f64], by: f64) -> Vec<Spline> {
+        let mut moved = splines.to_vec();
+        let inner = direction.len() / splines.len();
+        for (spline, along) in moved.iter_mut().zip(direction.chunks_exact(inner)) {
+            let own = spline.points[HELD..HELD + inner].iter_mut();
+            own.zip(along).for_each(|(c, d)| *c += by * d);
+        }
+        moved
+    }
+
     /// The slope along eight directions is that of F itself by central differences, torque's barrier included; forward differences of Coulomb
     /// friction's tanh(q̇/v_s) are off by less than 0.5 %.
     #[test]
@@ -479,17 +490,9 @@ mod tests {
         let gradient = climb(splines.clone())
             .gradient(weight, &[])
             .expect("the gradient of a motion that shows something");
-        let inner = spans + DEGREE - 2 * HELD;
         for _ in 0..8 {
             let direction: Vec<f64> = gradient.iter().map(|_| random.normal()).collect();
-            let moved = |by: f64| {
-                let mut moved = splines.clone();
-                for (spline, along) in moved.iter_mut().zip(direction.chunks_exact(inner)) {
-                    let own = spline.points[HELD..HELD + inner].iter_mut();
-                    own.zip(along).for_each(|(c, d)| *c += by * d);
-                }
-                total(moved)
-            };
+            let moved = |by: f64| total(moved(&splines, &direction, by));
             let by = 1e-6;
             let wanted = (moved(by) - moved(-by)) / (2.0 * by);
             let slope = dot(&gradient, &direction);

@@ -1,7 +1,7 @@
 //! What a motion must stay within, joint by joint.
 
 use crate::error::{Error, Result};
-use crate::robot::{JointKind, Robot};
+use crate::robot::{JointDescription, JointKind, Robot};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
@@ -109,26 +109,10 @@ fn of_joint(robot: &Robot, joint: usize, stated: StatedLimits) -> Result<JointLi
     let description = robot.joint(joint);
     let (name, file) = (description.name.as_str(), description.limits);
     let mut assumed = Vec::new();
-    let endless = description.kind == JointKind::Continuous;
     let of_file = (file.lower.zip(file.upper))
-        .filter(|_| !endless)
+        .filter(|_| description.kind != JointKind::Continuous)
         .map(|(low, high)| [low, high]);
-    let position = match stated.position.or(of_file) {
-        Some(range) => range,
-        None if endless => {
-            assumed.push("position");
-            [-WITHOUT_END, WITHOUT_END]
-        }
-        None => {
-            let problem = "has no range of positions".into();
-            let remedy = format!("state position = [low, high] for [joint.{name}]");
-            return Err(refused(name, problem, &remedy));
-        }
-    };
-    if !(position[0] < position[1] && position.iter().all(|x| x.is_finite())) {
-        let problem = format!("has the positions {} to {}", position[0], position[1]);
-        return Err(refused(name, problem, "give the smaller one first"));
-    }
+    let position = positions(description, stated.position.or(of_file), &mut assumed)?;
     let velocity = stated.velocity.or(file.velocity.filter(|v| *v > 0.0));
     let Some(velocity) = velocity else {
         let remedy = format!("state velocity for [joint.{name}], rad/s or m/s");
@@ -156,19 +140,7 @@ fn of_joint(robot: &Robot, joint: usize, stated: StatedLimits) -> Result<JointLi
             return Err(refused(name, problem, "give a positive number"));
         }
     }
-    let middle = 0.5 * (position[0] + position[1]);
-    let inside = |x: f64| position[0] <= x && x <= position[1];
-    let start = stated.start.unwrap_or_else(|| {
-        assumed.push("start");
-        if inside(0.0) { 0.0 } else { middle }
-    });
-    if !inside(start) {
-        let problem = format!(
-            "starts at {start}, outside {} to {}",
-            position[0], position[1]
-        );
-        return Err(refused(name, problem, "give a start within the limits"));
-    }
+    let start = start(name, position, stated.start, &mut assumed)?;
     let beyond = |own: f64, file: Option<f64>| file.is_some_and(|file| file > 0.0 && own > file);
     let further = of_file.is_some_and(|[low, high]| position[0] < low || position[1] > high);
     let more = [
@@ -188,6 +160,55 @@ fn of_joint(robot: &Robot, joint: usize, stated: StatedLimits) -> Result<JointLi
         assumed,
         beyond_model: more.map(|(key, _)| key).collect(),
     })
+}
+
+/// Positions of a joint: its `range`, or any where it turns without end.
+fn positions(
+    joint: &JointDescription,
+    range: Option<[f64; 2]>,
+    assumed: &mut Vec<&'static str>,
+) -> Result<[f64; 2]> {
+    let name = joint.name.as_str();
+    let position = match range {
+        Some(range) => range,
+        None if joint.kind == JointKind::Continuous => {
+            assumed.push("position");
+            [-WITHOUT_END, WITHOUT_END]
+        }
+        None => {
+            let problem = "has no range of positions".into();
+            let remedy = format!("state position = [low, high] for [joint.{name}]");
+            return Err(refused(name, problem, &remedy));
+        }
+    };
+    if !(position[0] < position[1] && position.iter().all(|x| x.is_finite())) {
+        let problem = format!("has the positions {} to {}", position[0], position[1]);
+        return Err(refused(name, problem, "give the smaller one first"));
+    }
+    Ok(position)
+}
+
+/// Where a joint's motion starts: as stated, at 0, or in the middle of its range where that does not hold 0.
+fn start(
+    name: &str,
+    position: [f64; 2],
+    stated: Option<f64>,
+    assumed: &mut Vec<&'static str>,
+) -> Result<f64> {
+    let middle = 0.5 * (position[0] + position[1]);
+    let inside = |x: f64| position[0] <= x && x <= position[1];
+    let start = stated.unwrap_or_else(|| {
+        assumed.push("start");
+        if inside(0.0) { 0.0 } else { middle }
+    });
+    if !inside(start) {
+        let problem = format!(
+            "starts at {start}, outside {} to {}",
+            position[0], position[1]
+        );
+        return Err(refused(name, problem, "give a start within the limits"));
+    }
+    Ok(start)
 }
 
 /// The k-th of a sequence of positions that fills the limits evenly: multiples of square roots of primes.

@@ -83,28 +83,8 @@ impl<'a> Questions<'a> {
     ) -> Result<Self> {
         let (posterior, noise) = (&twin.posterior, &twin.noise);
         let name_of = names_of(problem, library);
-        let count = name_of.len();
         require_known(names, &name_of)?;
-        let pip = |component: usize| {
-            let mut all = posterior.component.iter().zip(&posterior.inclusion);
-            all.find(|(own, _)| **own == component)
-                .map_or(0.0, |(_, pip)| *pip)
-        };
-        let is_open = |component: usize| match names.is_empty() {
-            true => (OPEN[0]..OPEN[1]).contains(&pip(component)),
-            false => names.contains(&name_of[component]),
-        };
-        // A payload's tensor goes with its mass: one question.
-        let is_first = |component: usize| !name_of[..component].contains(&name_of[component]);
-        let asked: Vec<usize> = (0..count)
-            .filter(|&component| is_open(component) && is_first(component))
-            .collect();
-        if asked.is_empty() {
-            return Err(setting(
-                "no effect has a probability between 0.05 and 0.95".into(),
-                "name effects with --decide, or give --model for a motion that shows all",
-            ));
-        }
+        let asked = asked(posterior, names, &name_of)?;
         let active: Vec<usize> = (0..posterior.inclusion.len())
             .filter(|&k| {
                 posterior.inclusion[k] >= ACTIVE || asked.contains(&problem.prior.component[k])
@@ -232,6 +212,35 @@ impl<'a> Questions<'a> {
         }
         sums
     }
+}
+
+/// The components that are open or named: what is asked, each name once.
+///
+/// # Errors
+/// [`Error::Setting`] where nothing is open.
+fn asked(posterior: &Posterior, names: &[String], name_of: &[String]) -> Result<Vec<usize>> {
+    let count = name_of.len();
+    let pip = |component: usize| {
+        let mut all = posterior.component.iter().zip(&posterior.inclusion);
+        all.find(|(own, _)| **own == component)
+            .map_or(0.0, |(_, pip)| *pip)
+    };
+    let is_open = |component: usize| match names.is_empty() {
+        true => (OPEN[0]..OPEN[1]).contains(&pip(component)),
+        false => names.contains(&name_of[component]),
+    };
+    // A payload's tensor goes with its mass: one question.
+    let is_first = |component: usize| !name_of[..component].contains(&name_of[component]);
+    let asked: Vec<usize> = (0..count)
+        .filter(|&component| is_open(component) && is_first(component))
+        .collect();
+    if asked.is_empty() {
+        return Err(setting(
+            "no effect has a probability between 0.05 and 0.95".into(),
+            "name effects with --decide, or give --model for a motion that shows all",
+        ));
+    }
+    Ok(asked)
 }
 
 /// Name of every component of a regression.

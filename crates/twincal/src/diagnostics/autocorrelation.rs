@@ -94,6 +94,13 @@ pub(super) fn effective_samples<C: AsRef<[f64]>>(chains: &[C]) -> f64 {
     }
     let correlation = |lag: usize| 1.0 - (within - covariance(lag)) / total;
 
+    let time = autocorrelation_time(draws, correlation);
+    let samples = count * length;
+    samples / time.max(1.0 / samples.log10())
+}
+
+/// τ of so many draws by Geyer's sequences, from the correlation at a lag.
+fn autocorrelation_time(draws: usize, correlation: impl Fn(usize) -> f64) -> f64 {
     // Initial positive sequence: pairs (even, odd) as long as their sum is positive.
     let mut rho = vec![0.0; draws];
     let (mut even, mut odd) = (1.0, correlation(1));
@@ -121,7 +128,5 @@ pub(super) fn effective_samples<C: AsRef<[f64]>>(chains: &[C]) -> f64 {
         t += 2;
     }
     let kept = (last + 1) as usize;
-    let time = -1.0 + 2.0 * rho[..kept].iter().sum::<f64>() + rho[kept];
-    let samples = count * length;
-    samples / time.max(1.0 / samples.log10())
+    -1.0 + 2.0 * rho[..kept].iter().sum::<f64>() + rho[kept]
 }

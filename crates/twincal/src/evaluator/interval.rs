@@ -83,58 +83,28 @@ impl Interval {
     fn what_counts(&self, acting: &Acting, joint: usize) -> (Vec<usize>, f64, Vec<f64>) {
         let (columns, x) = (&acting.which, &acting.torque);
         let c = |i: usize, k: usize| self.coordinates.covariance(columns[i], columns[k]);
-        // (C x)_i per state, over the coordinates that are still there.
-        let mut along: Vec<Vec<f64>> = (0..columns.len())
-            .map(|i| {
-                let mut row = vec![0.0; 2 * STATES];
-                for (k, x) in x.iter().enumerate() {
-                    let factor = c(i, k);
-                    for (sum, x) in row.iter_mut().zip(x) {
-                        *sum += factor * x;
-                    }
-                }
-                row
-            })
-            .collect();
+        // Over the coordinates that are still there.
+        let mut along = self.along(acting);
         let mut full = vec![0.0; 2 * STATES];
         for (x, along) in x.iter().zip(&along) {
             for (sum, (x, a)) in full.iter_mut().zip(x.iter().zip(along)) {
                 *sum += x * a;
             }
         }
-        let allowed: Vec<f64> = (full.iter().enumerate())
-            .map(|(state, full)| {
-                let share = if state < STATES {
-                    LEFT_OUT
-                } else {
-                    LEFT_OUT_AT_CORNERS
-                };
-                share * (self.noise[joint] + full)
-            })
-            .collect();
+        let allowed = allowed(self.noise[joint], &full);
         let mut kept: Vec<usize> = (0..columns.len()).collect();
         let mut missing = vec![0.0; 2 * STATES];
         let mut rest = 0.0;
-        while !kept.is_empty() {
-            let mut best: Option<(f64, f64, usize)> = None;
-            for (at, &i) in kept.iter().enumerate() {
-                let own = |s: usize| missing[s] + x[i][s] * (2.0 * along[i][s] - c(i, i) * x[i][s]);
-                let mean = (0..STATES).map(own).sum::<f64>() / STATES as f64;
-                let worst = (0..2 * STATES)
-                    .map(|s| (own(s) - mean).abs() / allowed[s])
-                    .fold(0.0, f64::max);
-                if best.is_none_or(|(least, ..)| worst < least) {
-                    best = Some((worst, mean, at));
-                }
-            }
-            let Some((worst, mean, at)) = best.filter(|(worst, ..)| *worst <= 1.0) else {
+        loop {
+            let own = |i: usize, s: usize| x[i][s] * (2.0 * along[i][s] - c(i, i) * x[i][s]);
+            let least = missed_least(&kept, &allowed, |i, s| missing[s] + own(i, s));
+            let Some((mean, at)) = least else {
                 break;
             };
-            debug_assert!(worst.is_finite());
             let i = kept.remove(at);
             rest = mean;
             for s in 0..2 * STATES {
-                missing[s] += x[i][s] * (2.0 * along[i][s] - c(i, i) * x[i][s]);
+                missing[s] += own(i, s);
             }
             for &k in &kept {
                 let factor = c(k, i);
@@ -154,6 +124,22 @@ impl Interval {
             rest,
             variance.collect(),
         )
+    }
+
+    /// (C x)_i per state.
+    fn along(&self, acting: &Acting) -> Vec<Vec<f64>> {
+        let (columns, x) = (&acting.which, &acting.torque);
+        let along = |&i: &usize| {
+            let mut row = vec![0.0; 2 * STATES];
+            for (&k, x) in columns.iter().zip(x) {
+                let factor = self.coordinates.covariance(i, k);
+                for (sum, x) in row.iter_mut().zip(x) {
+                    *sum += factor * x;
+                }
+            }
+            row
+        };
+        columns.iter().map(along).collect()
     }
 
     /// Largest difference of an interval's end from the mixture's, as a share of its width.
@@ -221,4 +207,40 @@ impl Interval {
         }
         variance
     }
+}
+
+/// What an approximation may be off by, per state, of the variance `full` of the coefficients.
+fn allowed(noise: f64, full: &[f64]) -> Vec<f64> {
+    (full.iter().enumerate())
+        .map(|(state, full)| {
+            let share = if state < STATES {
+                LEFT_OUT
+            } else {
+                LEFT_OUT_AT_CORNERS
+            };
+            share * (noise + full)
+        })
+        .collect()
+}
+
+/// The coordinate that a constant replaces best in every state, if well enough: that constant, and the coordinate's place in `kept`.
+/// `missing` is the variance that a state lacks without a coordinate.
+fn missed_least(
+    kept: &[usize],
+    allowed: &[f64],
+    missing: impl Fn(usize, usize) -> f64,
+) -> Option<(f64, usize)> {
+    let mut best: Option<(f64, f64, usize)> = None;
+    for (at, &i) in kept.iter().enumerate() {
+        let mean = (0..STATES).map(|s| missing(i, s)).sum::<f64>() / STATES as f64;
+        let worst = (0..2 * STATES)
+            .map(|s| (missing(i, s) - mean).abs() / allowed[s])
+            .fold(0.0, f64::max);
+        if best.is_none_or(|(least, ..)| worst < least) {
+            best = Some((worst, mean, at));
+        }
+    }
+    let (worst, mean, at) = best.filter(|(worst, ..)| *worst <= 1.0)?;
+    debug_assert!(worst.is_finite());
+    Some((mean, at))
 }

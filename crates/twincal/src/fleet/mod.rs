@@ -20,7 +20,7 @@ pub use result::{
 };
 pub use windows::WindowSpan;
 
-use crate::calibrate::{CalibrationSettings, Statistics};
+use crate::calibrate::{CalibrationSettings, Plan, Statistics};
 use crate::error::{Error, Result};
 use crate::posterior::Method;
 use known::Known;
@@ -144,19 +144,11 @@ impl Fleet {
         watch: &(dyn Fn(FleetStage) -> Result<()> + Sync),
     ) -> Result<FleetResult> {
         require(settings)?;
-        let (family, mut left_out) =
+        let (mut family, mut left_out) =
             logs::largest(self.families).ok_or_else(|| no_units(0, &[]))?;
-        let (kept, more) = logs::sifted(family.logs);
-        left_out.extend(more);
-        left_out.sort_by(|a, b| (&a.robot, &a.log).cmp(&(&b.robot, &b.log)));
-        let mut units = by_unit(kept);
-        if units.len() < 3 {
-            return Err(no_units(units.len(), &left_out));
-        }
+        let mut units = units_of(std::mem::take(&mut family.logs), &mut left_out)?;
         require_twins(&self.twins, &units)?;
-        let mut calibration = settings.calibration.clone();
-        calibration.library = family.plan.library.clone();
-        calibration.noise.model = family.plan.noise;
+        let calibration = as_planned(&settings.calibration, &family.plan);
         watch(FleetStage::Noise)?;
         let known = Known::new(&family.robot, &units, &calibration)?;
         let spans = spans(&units, settings.window);
@@ -205,6 +197,26 @@ impl Fleet {
         }
         Ok(result)
     }
+}
+
+/// Settings of a calibration with the library and the noise of a plan.
+fn as_planned(settings: &CalibrationSettings, plan: &Plan) -> CalibrationSettings {
+    let mut calibration = settings.clone();
+    calibration.library = plan.library.clone();
+    calibration.noise.model = plan.noise;
+    calibration
+}
+
+/// At least three units whose logs count; other logs go to those that are left out.
+fn units_of(logs: Vec<KeptLog>, left_out: &mut Vec<LeftOut>) -> Result<Vec<FleetUnit>> {
+    let (kept, more) = logs::sifted(logs);
+    left_out.extend(more);
+    left_out.sort_by(|a, b| (&a.robot, &a.log).cmp(&(&b.robot, &b.log)));
+    let units = by_unit(kept);
+    if units.len() < 3 {
+        return Err(no_units(units.len(), left_out));
+    }
+    Ok(units)
 }
 
 /// # Errors

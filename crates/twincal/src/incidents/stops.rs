@@ -2,7 +2,8 @@
 
 use super::incident::{Incident, IncidentKind};
 use crate::robot::{Motion, Robot, nominal_torque};
-use crate::signal::{Pipeline, Trajectory};
+use crate::signal::{Pipeline, Segment, Trajectory};
+use std::ops::Range;
 
 /// Shortest stop, s and samples.
 const SHORTEST: f64 = 0.25;
@@ -19,18 +20,7 @@ const TIMES: f64 = 5.0;
 pub(super) fn stops(robot: &Robot, pipeline: &Pipeline, trajectory: &Trajectory) -> Vec<Incident> {
     let names = robot.joint_names();
     let dof = trajectory.dof;
-    let typical: Vec<f64> = (0..dof)
-        .map(|joint| {
-            let (mut sum, mut count) = (0.0, 0_usize);
-            for segment in &trajectory.segments {
-                let len = segment.time.len();
-                let tau = &segment.tau[joint * len..(joint + 1) * len];
-                sum += tau.iter().map(|t| t * t).sum::<f64>();
-                count += len;
-            }
-            (sum / count.max(1) as f64).sqrt()
-        })
-        .collect();
+    let typical = rms_torque(trajectory);
     let mut found = Vec::new();
     for segment in &trajectory.segments {
         let len = segment.time.len();
@@ -51,29 +41,7 @@ pub(super) fn stops(robot: &Robot, pipeline: &Pipeline, trajectory: &Trajectory)
                     if i - from < fewest {
                         continue;
                     }
-                    // what holding would take, in the joint where it is most for its drive
-                    let middle = (from + i) / 2;
-                    let q: Vec<f64> = (0..dof).map(|j| segment.q[j * len + middle]).collect();
-                    let rest = vec![0.0; dof];
-                    let mut holding = vec![0.0; dof];
-                    let pose = Motion {
-                        len: 1,
-                        q: &q,
-                        qd: &rest,
-                        qdd: &rest,
-                    };
-                    nominal_torque(robot, pose, &mut holding);
-                    let needed = |joint: usize| {
-                        let tau = &segment.tau[joint * len + from..joint * len + i];
-                        let tau = tau.iter().sum::<f64>() / tau.len() as f64;
-                        let needed = holding[joint].abs();
-                        let clear = needed > HOLDING * typical[joint] && needed > TIMES * tau.abs();
-                        clear.then_some((joint, needed))
-                    };
-                    let most = (0..dof)
-                        .filter_map(needed)
-                        .max_by(|a, b| (a.1 / typical[a.0]).total_cmp(&(b.1 / typical[b.0])));
-                    if let Some((joint, torque)) = most {
+                    if let Some((joint, torque)) = missing(robot, segment, from..i, &typical) {
                         found.push(Incident {
                             kind: IncidentKind::DrivesOff,
                             joint: names[joint].to_owned(),
@@ -88,4 +56,51 @@ pub(super) fn stops(robot: &Robot, pipeline: &Pipeline, trajectory: &Trajectory)
         }
     }
     found
+}
+
+/// Rms torque of every joint, N·m or N.
+fn rms_torque(trajectory: &Trajectory) -> Vec<f64> {
+    (0..trajectory.dof)
+        .map(|joint| {
+            let (mut sum, mut count) = (0.0, 0_usize);
+            for segment in &trajectory.segments {
+                let len = segment.time.len();
+                let tau = &segment.tau[joint * len..(joint + 1) * len];
+                sum += tau.iter().map(|t| t * t).sum::<f64>();
+                count += len;
+            }
+            (sum / count.max(1) as f64).sqrt()
+        })
+        .collect()
+}
+
+/// What holding would take that is not there, in the joint where it is most for its drive; `typical` are the joints' rms torques.
+fn missing(
+    robot: &Robot,
+    segment: &Segment,
+    rest: Range<usize>,
+    typical: &[f64],
+) -> Option<(usize, f64)> {
+    let (dof, len) = (typical.len(), segment.time.len());
+    let middle = (rest.start + rest.end) / 2;
+    let q: Vec<f64> = (0..dof).map(|j| segment.q[j * len + middle]).collect();
+    let at_rest = vec![0.0; dof];
+    let mut holding = vec![0.0; dof];
+    let pose = Motion {
+        len: 1,
+        q: &q,
+        qd: &at_rest,
+        qdd: &at_rest,
+    };
+    nominal_torque(robot, pose, &mut holding);
+    let needed = |joint: usize| {
+        let tau = &segment.tau[joint * len + rest.start..joint * len + rest.end];
+        let tau = tau.iter().sum::<f64>() / tau.len() as f64;
+        let needed = holding[joint].abs();
+        let clear = needed > HOLDING * typical[joint] && needed > TIMES * tau.abs();
+        clear.then_some((joint, needed))
+    };
+    (0..dof)
+        .filter_map(needed)
+        .max_by(|a, b| (a.1 / typical[a.0]).total_cmp(&(b.1 / typical[b.0])))
 }

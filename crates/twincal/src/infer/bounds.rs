@@ -23,7 +23,7 @@ use super::reduced::Reduced;
 use super::standard::{Standard, nudged};
 use super::tableau::Tableau;
 use crate::error::Result;
-use crate::linear_algebra::Cholesky;
+use crate::linear_algebra::{Cholesky, NotPositiveDefinite};
 use crate::posterior::{Model, Problem};
 use acting::{Acting, Bound, FAR};
 pub(super) use acting::{SlabMasses, most_of_sums};
@@ -315,7 +315,24 @@ pub(super) fn truncate(
     if weights != Weights::Whole {
         log_ratio += log_mass;
     }
-    // Sites are in x = (aᵀβ − lower)/sd: −½ τ x² + ν x.
+    let at_bounds = near.iter().zip(sites).map(|(&a, (precision, shift))| {
+        // Sites are in x = (aᵀβ − lower)/sd: −½ τ x² + ν x.
+        let (bound, sd) = (&acting.bounds[a], places[a].0);
+        let precision = phi * precision / (sd * sd);
+        let shift = phi * shift / sd + precision * bound.lower;
+        (bound, precision, shift)
+    });
+    match_sites(model, count, at_bounds)
+        .map_err(|error| standard.singular(positions[error.pivot]))?;
+    Ok(log_ratio)
+}
+
+/// Multiplies a model of `count` columns by sites −½ precision (aᵀβ)² + shift aᵀβ, in units of φ.
+fn match_sites<'a>(
+    model: &mut Model,
+    count: usize,
+    sites: impl Iterator<Item = (&'a Bound, f64, f64)>,
+) -> std::result::Result<(), NotPositiveDefinite> {
     let mut matrix = multiply_transposed(&model.factor, count);
     let mut right = vec![0.0; count];
     for i in 0..count {
@@ -323,10 +340,7 @@ pub(super) fn truncate(
             .map(|k| matrix[i * count + k] * model.mean[k])
             .sum();
     }
-    for (&a, (precision, shift)) in near.iter().zip(sites) {
-        let (bound, sd) = (&acting.bounds[a], places[a].0);
-        let precision = phi * precision / (sd * sd);
-        let shift = phi * shift / sd + precision * bound.lower;
+    for (bound, precision, shift) in sites {
         for &(i, f) in &bound.terms {
             let others = bound.terms.iter();
             others.for_each(|&(k, g)| matrix[i * count + k] += precision * f * g);
@@ -334,12 +348,11 @@ pub(super) fn truncate(
         }
         model.sites.push(bound.site(precision, shift));
     }
-    let factor =
-        nudged(&matrix, count).map_err(|error| standard.singular(positions[error.pivot]))?;
+    let factor = nudged(&matrix, count)?;
     factor.solve(&mut right);
     model.mean = right;
     model.factor = factor.into_lower();
-    Ok(log_ratio)
+    Ok(())
 }
 
 /// The bounds that act, ln of the mass within them and their sites, from (standard deviation, distance in it) of the mean from every bound

@@ -52,38 +52,7 @@ pub(super) fn components(
     };
     let inverse = factor.inverse();
     let size = standard.size();
-    let cost = |block: &Block| -> f64 {
-        let square: Vec<f64> = block
-            .range()
-            .flat_map(|i| inverse[i * size..][block.range()].iter().copied())
-            .collect();
-        let mut half = standard.center[block.range()].to_vec();
-        match Cholesky::new(&square, block.len) {
-            Ok(factor) => factor.solve_lower(&mut half),
-            Err(_) => return 0.0,
-        }
-        half.iter().map(|x| x * x).sum()
-    };
-    let bounds = Bounds {
-        standard,
-        prior,
-        costs: standard.blocks.iter().map(cost).collect(),
-        spread: (0..size).map(|d| inverse[d * size + d]).collect(),
-        factors: standard.blocks.iter().map(|b| b.factor.ln()).sum::<f64>()
-            + most_of_sums(standard),
-        sums: standard
-            .halves
-            .iter()
-            .map(|half| {
-                let pairs = |&(i, f): &(usize, f64)| {
-                    let row = half.terms.iter().map(move |(j, g)| (i * size + j, f * g));
-                    row.map(|(entry, product)| product * inverse[entry])
-                        .sum::<f64>()
-                };
-                half.terms.iter().map(pairs).sum()
-            })
-            .collect(),
-    };
+    let bounds = Bounds::of(standard, prior, &inverse);
     let reference = match prior.settled_structure() {
         Some(holds) => weight_of(standard, problem, &holds),
         None => near.and_then(|near| weight_of_heaviest(standard, problem, near)),
@@ -172,7 +141,44 @@ struct Bounds<'a> {
     sums: Vec<f64>,
 }
 
-impl Bounds<'_> {
+impl<'a> Bounds<'a> {
+    /// From A⁻¹ of the full model.
+    fn of(standard: &'a Standard, prior: &'a Prior, inverse: &[f64]) -> Self {
+        let size = standard.size();
+        let cost = |block: &Block| -> f64 {
+            let square: Vec<f64> = block
+                .range()
+                .flat_map(|i| inverse[i * size..][block.range()].iter().copied())
+                .collect();
+            let mut half = standard.center[block.range()].to_vec();
+            match Cholesky::new(&square, block.len) {
+                Ok(factor) => factor.solve_lower(&mut half),
+                Err(_) => return 0.0,
+            }
+            half.iter().map(|x| x * x).sum()
+        };
+        Self {
+            standard,
+            prior,
+            costs: standard.blocks.iter().map(cost).collect(),
+            spread: (0..size).map(|d| inverse[d * size + d]).collect(),
+            factors: standard.blocks.iter().map(|b| b.factor.ln()).sum::<f64>()
+                + most_of_sums(standard),
+            sums: standard
+                .halves
+                .iter()
+                .map(|half| {
+                    let pairs = |&(i, f): &(usize, f64)| {
+                        let row = half.terms.iter().map(move |(j, g)| (i * size + j, f * g));
+                        row.map(|(entry, product)| product * inverse[entry])
+                            .sum::<f64>()
+                    };
+                    half.terms.iter().map(pairs).sum()
+                })
+                .collect(),
+        }
+    }
+
     /// `reference`: ln of the weight of any model.
     fn judge(&self, reference: f64) -> Certain {
         let standard = self.standard;

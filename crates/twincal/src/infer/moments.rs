@@ -5,7 +5,7 @@ use super::kin::Step;
 use super::pivot::Pivot;
 use super::standard::Standard;
 use super::walker::Walker;
-use crate::linear_algebra::Cholesky;
+use crate::linear_algebra::{Cholesky, NotPositiveDefinite};
 use crate::prior::HalfSpace;
 use statrs::function::erf::erfc;
 
@@ -145,12 +145,7 @@ pub(super) fn after_flip(walker: &Walker<'_>, block: usize, excess: f64, joint: 
     let inside = tableau.holds(block);
     moments.holds[block] = !inside;
     // S⁻¹ or C_BB⁻¹ as rows of L⁻¹: x ↦ |L⁻¹ x|², and its product with the gradient.
-    let square: Vec<f64> = if own.len == 1 {
-        vec![tableau.diagonal[own.start]]
-    } else {
-        tableau.square(block).to_vec()
-    };
-    let Ok(factor) = Cholesky::new(&square, own.len) else {
+    let Ok(factor) = factor_of(walker, block) else {
         return present(walker, joint);
     };
     let mut step = tableau.gradient[own.range()].to_vec();
@@ -159,9 +154,11 @@ pub(super) fn after_flip(walker: &Walker<'_>, block: usize, excess: f64, joint: 
     let stays: Vec<usize> = (tableau.members.iter().copied())
         .filter(|i| !own.range().contains(i))
         .collect();
-    // L⁻¹ of the block's part of every row that stays.
-    let mut halves = vec![0.0; stays.len() * own.len];
-    for (&i, cross) in stays.iter().zip(halves.chunks_exact_mut(own.len)) {
+    let entering = if inside { 0..0 } else { own.range() };
+    // L⁻¹ of the block's part of every row that stays, then of the entering unit vectors.
+    let mut halves = vec![0.0; (stays.len() + entering.len()) * own.len];
+    let (rows, units) = halves.split_at_mut(stays.len() * own.len);
+    for (&i, cross) in stays.iter().zip(rows.chunks_exact_mut(own.len)) {
         cross.copy_from_slice(&tableau.row(i)[own.range()]);
         let shift: f64 = cross.iter().zip(&step).map(|(t, b)| t * b).sum();
         moments.delta[i] -= shift;
@@ -169,8 +166,6 @@ pub(super) fn after_flip(walker: &Walker<'_>, block: usize, excess: f64, joint: 
         let spread: f64 = cross.iter().map(|x| x * x).sum();
         moments.variance[i] = (moments.variance[i] + sign * spread).max(1.0);
     }
-    // L⁻¹ of the block's unit vectors.
-    let mut units = vec![0.0; own.len * own.len];
     if inside {
         for k in own.range() {
             moments.delta[k] = -standard.center[k];
@@ -186,17 +181,15 @@ pub(super) fn after_flip(walker: &Walker<'_>, block: usize, excess: f64, joint: 
         }
     }
     if joint {
-        let entering = if inside { 0..0 } else { own.range() };
-        let old = |i: usize, j: usize| tableau.row(i)[j];
+        let half = |a: usize| &halves[a * own.len..(a + 1) * own.len];
         let change = |a: usize, b: usize| {
-            let half = |a: usize| halves_or(&halves, &units, stays.len(), own.len, a);
-            let (x, y) = (half(a), half(b));
-            x.iter().zip(y).map(|(x, y)| x * y).sum::<f64>()
+            let pairs = half(a).iter().zip(half(b));
+            pairs.map(|(x, y)| x * y).sum::<f64>()
         };
         moments.inside = stays.iter().copied().chain(entering).collect();
         let staying = stays.len();
         moments.fill(|a, b, i, j| match (a < staying, b < staying) {
-            (true, true) => old(i, j) + sign * change(a, b),
+            (true, true) => tableau.row(i)[j] + sign * change(a, b),
             (false, false) => change(a, b),
             _ => -change(a, b),
         });
@@ -204,17 +197,15 @@ pub(super) fn after_flip(walker: &Walker<'_>, block: usize, excess: f64, joint: 
     moments
 }
 
-/// Row `a` of `first`, which has `count` rows of `len`, with `second` below it.
-fn halves_or<'a>(
-    first: &'a [f64],
-    second: &'a [f64],
-    count: usize,
-    len: usize,
-    a: usize,
-) -> &'a [f64] {
-    match a.checked_sub(count) {
-        None => &first[a * len..(a + 1) * len],
-        Some(a) => &second[a * len..(a + 1) * len],
+/// The factor of S or C_BB of a component.
+fn factor_of(
+    walker: &Walker<'_>,
+    block: usize,
+) -> std::result::Result<Cholesky, NotPositiveDefinite> {
+    let (own, tableau) = (walker.standard.blocks[block], &walker.tableau);
+    match own.len {
+        1 => Cholesky::new(&tableau.diagonal[own.start..=own.start], 1),
+        len => Cholesky::new(tableau.square(block), len),
     }
 }
 

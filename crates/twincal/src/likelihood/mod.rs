@@ -288,27 +288,8 @@ pub fn assemble(
     plug_in: &PlugIn,
     settings: &PriorSettings,
 ) -> Result<Problem> {
-    let count = columns.names.len();
-    let (mut gram, mut xy, mut yy) = (vec![0.0; count * count], vec![0.0; count], 0.0);
-    let (mut n, mut log_constant) = (0.0, 0.0);
-    for (j, joint) in grams.joints.iter().enumerate() {
-        let (factor, temper) = (plug_in.factor(j), plug_in.counted(j));
-        let rho = plug_in.rho[j];
-        let statistics = joint.stationary(rho);
-        let (size, values) = (statistics.size, &statistics.values);
-        let last = size - 1;
-        for (a, &row) in joint.columns.iter().enumerate() {
-            for (b, &column) in joint.columns.iter().enumerate() {
-                gram[row as usize * count + column as usize] += factor * values[a * size + b];
-            }
-            xy[row as usize] += factor * values[a * size + last];
-        }
-        yy += factor * values[last * size + last];
-        n += temper * joint.n;
-        log_constant += 0.5 * temper * joint.n * plug_in.weight[j].ln();
-        log_constant += 0.5 * temper * joint.starts * (-rho * rho).ln_1p();
-    }
-    let unexplained = scale_of_residual(yy / n.max(f64::MIN_POSITIVE));
+    let sums = WeightedSums::of(grams, columns.names.len(), plug_in);
+    let unexplained = scale_of_residual(sums.yy / sums.n.max(f64::MIN_POSITIVE));
     let noise = if plug_in.noise > 0.0 {
         plug_in.noise
     } else {
@@ -330,7 +311,7 @@ pub fn assemble(
                 }
                 _ => plug_in.scaled_variance[columns.family_of(k)] / reference,
             };
-            let widest = WIDEST_SLAB / gram[k * count + k];
+            let widest = WIDEST_SLAB / sums.gram[k * columns.names.len() + k];
             if learned { slab.min(widest) } else { slab }
         })
         .collect();
@@ -343,26 +324,73 @@ pub fn assemble(
     if let Some(payload) = payload.filter(|_| learned) {
         odds[payload] *= plug_in.payload.odds;
     }
-    Ok(Problem {
-        gram,
-        xy,
-        yy,
-        n,
-        log_constant,
-        prior: Prior {
-            slab,
-            component: columns.component.clone(),
-            family: families,
-            parent: columns.parent.clone(),
-            odds,
-            lower: columns.lower.clone(),
-            halves: columns.halves.clone(),
-            inclusion,
-            shape,
-            scale,
-        },
-        names: columns.names.clone(),
-    })
+    let prior = Prior {
+        slab,
+        component: columns.component.clone(),
+        family: families,
+        parent: columns.parent.clone(),
+        odds,
+        lower: columns.lower.clone(),
+        halves: columns.halves.clone(),
+        inclusion,
+        shape,
+        scale,
+    };
+    Ok(sums.problem(prior, columns.names.clone()))
+}
+
+/// The statistics of all joints, each with its weight and temper.
+struct WeightedSums {
+    gram: Vec<f64>,
+    xy: Vec<f64>,
+    yy: f64,
+    n: f64,
+    log_constant: f64,
+}
+
+impl WeightedSums {
+    /// Over K = `count` columns.
+    fn of(grams: &Gram, count: usize, plug_in: &PlugIn) -> Self {
+        let (mut gram, mut xy, mut yy) = (vec![0.0; count * count], vec![0.0; count], 0.0);
+        let (mut n, mut log_constant) = (0.0, 0.0);
+        for (j, joint) in grams.joints.iter().enumerate() {
+            let (factor, temper) = (plug_in.factor(j), plug_in.counted(j));
+            let rho = plug_in.rho[j];
+            let statistics = joint.stationary(rho);
+            let (size, values) = (statistics.size, &statistics.values);
+            let last = size - 1;
+            for (a, &row) in joint.columns.iter().enumerate() {
+                for (b, &column) in joint.columns.iter().enumerate() {
+                    gram[row as usize * count + column as usize] += factor * values[a * size + b];
+                }
+                xy[row as usize] += factor * values[a * size + last];
+            }
+            yy += factor * values[last * size + last];
+            n += temper * joint.n;
+            log_constant += 0.5 * temper * joint.n * plug_in.weight[j].ln();
+            log_constant += 0.5 * temper * joint.starts * (-rho * rho).ln_1p();
+        }
+        Self {
+            gram,
+            xy,
+            yy,
+            n,
+            log_constant,
+        }
+    }
+
+    /// The regression under a prior.
+    fn problem(self, prior: Prior, names: Vec<String>) -> Problem {
+        Problem {
+            gram: self.gram,
+            xy: self.xy,
+            yy: self.yy,
+            n: self.n,
+            log_constant: self.log_constant,
+            prior,
+            names,
+        }
+    }
 }
 
 /// Share of a joint's rows on which a shape that fades with speed acts, at least, where its slab is made: where the training motion

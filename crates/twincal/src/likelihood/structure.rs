@@ -71,17 +71,7 @@ pub(super) fn structure(
             },
         });
     }
-    for (family, expected) in &settings.families {
-        if !columns.families.contains(family) {
-            return Err(Error::Setting {
-                key: format!("prior.families.{}", family.word()),
-                problem: format!(
-                    "{expected} components expected of a family that has no candidate here"
-                ),
-                remedy: "leave the key out, or ask for the family in [library]".into(),
-            });
-        }
-    }
+    refuse_absent(columns, settings)?;
     let parts = [Family::Payload, Family::PayloadTensor].map(|own| columns.place_of(own));
     if let ([Some(payload), Some(tensor)], None) = (parts, settings.inclusion) {
         odds[payload] /= 1.0 + odds[tensor] / reference(inclusion, count);
@@ -99,6 +89,22 @@ pub(super) fn structure(
         odds.push(SETTLED);
     }
     Ok((family, odds, inclusion))
+}
+
+/// An error for an expected number of a family without a candidate.
+fn refuse_absent(columns: &Columns, settings: &PriorSettings) -> Result<()> {
+    for (family, expected) in &settings.families {
+        if !columns.families.contains(family) {
+            return Err(Error::Setting {
+                key: format!("prior.families.{}", family.word()),
+                problem: format!(
+                    "{expected} components expected of a family that has no candidate here"
+                ),
+                remedy: "leave the key out, or ask for the family in [library]".into(),
+            });
+        }
+    }
+    Ok(())
 }
 
 /// b of a family with r = 1 among `count` components; 1 where components are independent, so that only ratios matter.

@@ -118,20 +118,23 @@ impl pulp::WithSimd for Quantile<'_> {
     }
 }
 
-impl Quantile<'_> {
-    /// Halley's method on F(y) − p inside the bracket of the components' own quantiles, bisection where it leaves it; above the median
-    /// that of the mirrored mixture, whose smaller tail keeps its digits.
+/// Where a quantile lies.
+struct Bracket {
+    /// The components' own quantiles: the least and the largest.
+    low: f64,
+    high: f64,
+    /// Scales of the components: the least and the largest.
+    narrowest: f64,
+    widest: f64,
+    /// Moments of the mixture about its first location.
+    mean: f64,
+    square: f64,
+}
+
+impl Bracket {
+    /// For a mixture at these locations instead of its own.
     #[inline(always)]
-    fn solve(self) -> f64 {
-        let mixture = self.mixture;
-        let mirror = self.level.probability > 0.5;
-        let sign = if mirror { -1.0 } else { 1.0 };
-        let probability = match mirror {
-            true => 1.0 - self.level.probability,
-            false => self.level.probability,
-        };
-        let standard = sign * self.level.standard;
-        let locations: Vec<f64> = mixture.locations.iter().map(|l| sign * l).collect();
+    fn of(mixture: &Mixture<'_>, locations: &[f64], standard: f64) -> Self {
         let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
         let (mut narrowest, mut widest) = (f64::INFINITY, 0.0_f64);
         let (mut mean, mut square) = (0.0, 0.0);
@@ -147,6 +150,40 @@ impl Quantile<'_> {
             mean += weight * shift;
             square += weight * (shift * shift + scale * scale);
         }
+        Self {
+            low,
+            high,
+            narrowest,
+            widest,
+            mean,
+            square,
+        }
+    }
+}
+
+impl Quantile<'_> {
+    /// Halley's method on F(y) − p inside the bracket of the components' own quantiles, bisection where it leaves it; above the median
+    /// that of the mirrored mixture, whose smaller tail keeps its digits.
+    #[inline(always)]
+    fn solve(self) -> f64 {
+        let mixture = self.mixture;
+        let mirror = self.level.probability > 0.5;
+        let sign = if mirror { -1.0 } else { 1.0 };
+        let probability = match mirror {
+            true => 1.0 - self.level.probability,
+            false => self.level.probability,
+        };
+        let standard = sign * self.level.standard;
+        let locations: Vec<f64> = mixture.locations.iter().map(|l| sign * l).collect();
+        let anchor = locations[0];
+        let Bracket {
+            mut low,
+            mut high,
+            narrowest,
+            widest,
+            mean,
+            square,
+        } = Bracket::of(mixture, &locations, standard);
         if low >= high {
             return sign * low;
         }

@@ -197,25 +197,27 @@ mod tests {
     use super::*;
     use crate::posterior::Method;
 
+    /// A matrix with these numbers on its diagonal and 0 elsewhere.
+    fn diagonal(numbers: Vec<f64>) -> Vec<f64> {
+        let size = numbers.len();
+        let mut matrix = vec![0.0; size * size];
+        for (i, number) in numbers.into_iter().enumerate() {
+            matrix[i * size + i] = number;
+        }
+        matrix
+    }
+
     /// Two columns, three models, numbers chosen so that everything has a closed form.
     fn posterior(unit: f64) -> Posterior {
         // A = diag(4, 25) in unit columns; β's unit is 1/unit of the column's.
         let (m1, m2) = (2.0 / unit, -0.5);
-        let factor = |members: &[u32]| -> Vec<f64> {
-            let diagonal: Vec<f64> = members
-                .iter()
-                .map(|&k| if k == 0 { 2.0 * unit } else { 5.0 })
-                .collect();
-            let size = diagonal.len();
-            (0..size * size)
-                .map(|i| {
-                    if i / size == i % size {
-                        diagonal[i / size]
-                    } else {
-                        0.0
-                    }
-                })
-                .collect()
+        let factor = |members: &[u32]| {
+            let roots = members.iter();
+            diagonal(
+                roots
+                    .map(|&k| if k == 0 { 2.0 * unit } else { 5.0 })
+                    .collect(),
+            )
         };
         let model = |members: &[u32], weight: f64| Model {
             members: members.to_vec(),

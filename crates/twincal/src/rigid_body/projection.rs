@@ -363,36 +363,7 @@ impl Problem {
             let Some(factors) = self.factors(&x[..self.size], lift) else {
                 return;
             };
-            let weight = if lifted { 1e-6 } else { t };
-            let mut gradient = vec![0.0; count];
-            let mut hessian = vec![0.0; count * count];
-            for i in 0..self.size {
-                gradient[i] = weight * x[i];
-                hessian[i * count + i] = weight;
-            }
-            if lifted {
-                gradient[self.size] = t;
-            }
-            let identity: Four =
-                std::array::from_fn(|i| std::array::from_fn(|j| f64::from(u8::from(i == j))));
-            for (l, lower) in factors.iter().enumerate() {
-                let z = inverse(lower);
-                let mut active: Vec<(usize, Four)> = Vec::new();
-                let slopes = self.slopes[l].iter().chain(lifted.then_some(&identity));
-                for (i, slope) in slopes.enumerate() {
-                    if slope.iter().flatten().any(|&v| v != 0.0) {
-                        gradient[i] -= inner(&z, slope);
-                        active.push((i, times(&z, slope)));
-                    }
-                }
-                for (i, a) in &active {
-                    for (j, b) in &active {
-                        let turned: Four =
-                            std::array::from_fn(|r| std::array::from_fn(|c| b[c][r]));
-                        hessian[i * count + j] += inner(a, &turned);
-                    }
-                }
-            }
+            let (gradient, hessian) = self.derivatives(x, &factors, t, lifted);
             let Ok(root) = Cholesky::new(&hessian, count) else {
                 return;
             };
@@ -425,5 +396,46 @@ impl Problem {
                 return;
             }
         }
+    }
+
+    /// Gradient and Hessian of [`Self::value`], from the factors of all matrices.
+    fn derivatives(
+        &self,
+        x: &[f64],
+        factors: &[Four],
+        t: f64,
+        lifted: bool,
+    ) -> (Vec<f64>, Vec<f64>) {
+        let count = x.len();
+        let weight = if lifted { 1e-6 } else { t };
+        let mut gradient = vec![0.0; count];
+        let mut hessian = vec![0.0; count * count];
+        for i in 0..self.size {
+            gradient[i] = weight * x[i];
+            hessian[i * count + i] = weight;
+        }
+        if lifted {
+            gradient[self.size] = t;
+        }
+        let identity: Four =
+            std::array::from_fn(|i| std::array::from_fn(|j| f64::from(u8::from(i == j))));
+        for (l, lower) in factors.iter().enumerate() {
+            let z = inverse(lower);
+            let mut active: Vec<(usize, Four)> = Vec::new();
+            let slopes = self.slopes[l].iter().chain(lifted.then_some(&identity));
+            for (i, slope) in slopes.enumerate() {
+                if slope.iter().flatten().any(|&v| v != 0.0) {
+                    gradient[i] -= inner(&z, slope);
+                    active.push((i, times(&z, slope)));
+                }
+            }
+            for (i, a) in &active {
+                for (j, b) in &active {
+                    let turned: Four = std::array::from_fn(|r| std::array::from_fn(|c| b[c][r]));
+                    hessian[i * count + j] += inner(a, &turned);
+                }
+            }
+        }
+        (gradient, hessian)
     }
 }

@@ -85,17 +85,50 @@ pub fn base_parameters(robot: &Robot) -> BaseParameters {
             column.iter_mut().for_each(|v| *v /= length);
         }
     }
-    // Products of every column with the orthonormal directions, in the order of choice.
+    let Chosen {
+        columns: chosen,
+        products,
+        free,
+    } = choose(columns, &seen);
+    let name = |c: usize| format!("{}.{}", robot.bodies()[c / 10], PARAMETERS[c % 10]);
+    let dependent = (0..10 * bodies)
+        .filter(|&c| seen[c] && free[c])
+        .map(|c| DependentParameter {
+            name: name(c),
+            combination: combination(&chosen, &products, &lengths, c),
+        })
+        .collect();
+    BaseParameters {
+        count: chosen.len(),
+        names: chosen.iter().map(|&c| name(c)).collect(),
+        dependent,
+        unidentifiable: (0..10 * bodies).filter(|&c| !seen[c]).map(name).collect(),
+    }
+}
+
+/// Independent columns by Gram–Schmidt with pivoting.
+struct Chosen {
+    /// Independent columns, in the order of choice.
+    columns: Vec<usize>,
+    /// Products of every column with the orthonormal directions, in that order.
+    products: Vec<Vec<f64>>,
+    /// Columns that are seen and not chosen.
+    free: Vec<bool>,
+}
+
+/// Chooses among the columns of length 1 that are seen.
+fn choose(mut columns: Vec<Vec<f64>>, seen: &[bool]) -> Chosen {
+    let count = columns.len();
     let mut chosen: Vec<usize> = Vec::new();
     let mut directions: Vec<Vec<f64>> = Vec::new();
-    let mut products: Vec<Vec<f64>> = vec![Vec::new(); 10 * bodies];
-    let mut free = seen.clone();
+    let mut products: Vec<Vec<f64>> = vec![Vec::new(); count];
+    let mut free = seen.to_vec();
     // What is left of each column, brought up to date as parts go; measured again where most of it has gone.
-    let mut left = vec![1.0_f64; 10 * bodies];
+    let mut left = vec![1.0_f64; count];
     let mut measured = left.clone();
     for wanted in 0..3 {
         loop {
-            let candidates = (0..10 * bodies).filter(|&c| free[c] && kind(c) == wanted);
+            let candidates = (0..count).filter(|&c| free[c] && kind_of(c % 10) == wanted);
             let best = candidates
                 .map(|c| (c, left[c]))
                 .max_by(|a, b| a.1.total_cmp(&b.1));
@@ -111,7 +144,7 @@ pub fn base_parameters(robot: &Robot) -> BaseParameters {
             let length = norm(&direction);
             direction.iter_mut().for_each(|v| *v /= length);
             products[best].push(length);
-            for c in 0..10 * bodies {
+            for c in 0..count {
                 if free[c] {
                     let part = subtract(&mut columns[c], &direction);
                     products[c].push(part);
@@ -126,19 +159,10 @@ pub fn base_parameters(robot: &Robot) -> BaseParameters {
             directions.push(direction);
         }
     }
-    let name = |c: usize| format!("{}.{}", robot.bodies()[c / 10], PARAMETERS[c % 10]);
-    let dependent = (0..10 * bodies)
-        .filter(|&c| seen[c] && free[c])
-        .map(|c| DependentParameter {
-            name: name(c),
-            combination: combination(&chosen, &products, &lengths, c),
-        })
-        .collect();
-    BaseParameters {
-        count: chosen.len(),
-        names: chosen.iter().map(|&c| name(c)).collect(),
-        dependent,
-        unidentifiable: (0..10 * bodies).filter(|&c| !seen[c]).map(name).collect(),
+    Chosen {
+        columns: chosen,
+        products,
+        free,
     }
 }
 

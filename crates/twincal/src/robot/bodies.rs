@@ -91,22 +91,16 @@ pub(crate) fn lay_out(
             } => {
                 let to_z = z_to(unit_axis(joint, findings)?);
                 let rotation = multiply(&frame.rotation, &to_z);
-                bodies.push(Body {
+                let frame = Placement { rotation, ..frame };
+                let moved = Body {
                     parent: parent_body,
-                    rotation,
-                    about_x: is_about_x(&rotation),
-                    translation: frame.translation,
-                    prismatic: joint.kind == JointKind::Prismatic,
                     link: child,
                     coordinate: index,
                     multiplier,
                     offset,
-                    moments: Moments::default(),
-                    armature: joint.armature,
-                    damping: joint.damping,
-                    stiffness: joint.stiffness,
-                    spring_reference: joint.spring_reference,
-                });
+                    ..Body::of_joint(joint, frame)
+                };
+                bodies.push(moved);
                 (
                     Some(bodies.len() - 1),
                     Placement {
@@ -123,6 +117,28 @@ pub(crate) fn lay_out(
         }
     }
     Ok((bodies, home))
+}
+
+impl Body {
+    /// A body on the base that coordinate 0 moves as it is, without inertia of links.
+    fn of_joint(joint: &JointDescription, frame: Placement) -> Self {
+        Self {
+            parent: None,
+            rotation: frame.rotation,
+            about_x: is_about_x(&frame.rotation),
+            translation: frame.translation,
+            prismatic: joint.kind == JointKind::Prismatic,
+            link: 0,
+            coordinate: 0,
+            multiplier: 1.0,
+            offset: 0.0,
+            moments: Moments::default(),
+            armature: joint.armature,
+            damping: joint.damping,
+            stiffness: joint.stiffness,
+            spring_reference: joint.spring_reference,
+        }
+    }
 }
 
 /// The axis at length 1; a correction beyond printing precision is a finding.

@@ -207,20 +207,7 @@ fn forward<S: Simd>(
         wd[0] = s.mul_add_e_f64s(w[1], qd, wd[0]);
         wd[1] = s.negate_mul_add_e_f64s(w[0], qd, wd[1]);
     }
-    // dB = [dω̇]× + dω ωᵀ + ω dωᵀ − 2 (ω·dω) E
-    let along = dot(s, state.w, w);
-    let twice = s.add_f64s(along, along);
-    let mut b = [[s.splat_f64s(0.0); 3]; 3];
-    for i in 0..3 {
-        for j in 0..3 {
-            b[i][j] = s.mul_add_e_f64s(w[i], state.w[j], s.mul_f64s(state.w[i], w[j]));
-        }
-        b[i][i] = s.sub_f64s(b[i][i], twice);
-    }
-    for (i, j, k) in [(0, 1, 2), (1, 2, 0), (2, 0, 1)] {
-        b[i][j] = s.sub_f64s(b[i][j], wd[k]);
-        b[j][i] = s.add_f64s(b[j][i], wd[k]);
-    }
+    let b = relative_acceleration(s, state.w, w, wd);
     let m = s.splat_f64s(body.moments.mass);
     let mc = splat(s, body.moments.first);
     let [x, y, z] = body.moments.tensor;
@@ -239,6 +226,25 @@ fn forward<S: Simd>(
     ];
     tangent.force = matrix_add(s, &b, mc, inert);
     (tangent.w, tangent.wd, tangent.a, tangent.b) = (w, wd, a, b);
+}
+
+/// dB = [dω̇]× + dω ωᵀ + ω dωᵀ − 2 (ω·dω) E, of dω and dω̇.
+#[inline(always)]
+fn relative_acceleration<S: Simd>(s: S, spin: V3<S>, w: V3<S>, wd: V3<S>) -> [V3<S>; 3] {
+    let along = dot(s, spin, w);
+    let twice = s.add_f64s(along, along);
+    let mut b = [[s.splat_f64s(0.0); 3]; 3];
+    for i in 0..3 {
+        for j in 0..3 {
+            b[i][j] = s.mul_add_e_f64s(w[i], spin[j], s.mul_f64s(spin[i], w[j]));
+        }
+        b[i][i] = s.sub_f64s(b[i][i], twice);
+    }
+    for (i, j, k) in [(0, 1, 2), (1, 2, 0), (2, 0, 1)] {
+        b[i][j] = s.sub_f64s(b[i][j], wd[k]);
+        b[j][i] = s.add_f64s(b[j][i], wd[k]);
+    }
+    b
 }
 
 /// Derivatives of what a body gives to its parent; `state` holds the whole force and moment.

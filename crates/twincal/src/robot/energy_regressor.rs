@@ -4,6 +4,7 @@
 
 use super::Robot;
 use super::block::{BlockWorkspace, Group, Registers, STRIDE, add_to, run};
+use super::bodies::Body;
 use super::lane_vectors::{cross, cross_add, dot, dot_add, origin, splat, to_child, turn_back};
 use super::motion::Motion;
 use super::parameters::ENTRIES;
@@ -77,22 +78,7 @@ impl Group for Energies<'_> {
         for i in 0..bodies.len() {
             let (body, state) = (&bodies[i], &states[i]);
             let parent = body.parent.map_or(base, |parent| velocities[parent]);
-            let p = origin(s, body, state.position);
-            let at_origin = cross_add(s, parent.w, p, parent.v);
-            let mut own = Velocity {
-                w: to_child(s, body, parent.w),
-                v: to_child(s, body, at_origin),
-                gravity: to_child(s, body, parent.gravity),
-                fall: dot_add(s, parent.gravity, p, parent.fall),
-            };
-            if body.prismatic {
-                own.v[2] = s.add_f64s(own.v[2], state.velocity);
-            } else {
-                own.w = turn_back(s, state.cos, state.sin, own.w);
-                own.v = turn_back(s, state.cos, state.sin, own.v);
-                own.gravity = turn_back(s, state.cos, state.sin, own.gravity);
-                own.w[2] = s.add_f64s(own.w[2], state.velocity);
-            }
+            let own = velocity(s, body, parent, state);
             velocities[i] = own;
             let Velocity {
                 w,
@@ -126,4 +112,31 @@ impl Group for Energies<'_> {
             }
         }
     }
+}
+
+/// Velocity of a body from its parent's.
+#[inline(always)]
+fn velocity<S: Simd>(
+    s: S,
+    body: &Body,
+    parent: Velocity<S::f64s>,
+    state: &State<S::f64s>,
+) -> Velocity<S::f64s> {
+    let p = origin(s, body, state.position);
+    let at_origin = cross_add(s, parent.w, p, parent.v);
+    let mut own = Velocity {
+        w: to_child(s, body, parent.w),
+        v: to_child(s, body, at_origin),
+        gravity: to_child(s, body, parent.gravity),
+        fall: dot_add(s, parent.gravity, p, parent.fall),
+    };
+    if body.prismatic {
+        own.v[2] = s.add_f64s(own.v[2], state.velocity);
+    } else {
+        own.w = turn_back(s, state.cos, state.sin, own.w);
+        own.v = turn_back(s, state.cos, state.sin, own.v);
+        own.gravity = turn_back(s, state.cos, state.sin, own.gravity);
+        own.w[2] = s.add_f64s(own.w[2], state.velocity);
+    }
+    own
 }

@@ -2,6 +2,7 @@
 
 use super::Robot;
 use super::block::{BlockWorkspace, Group, Registers, STRIDE, add_to, run};
+use super::bodies::Body;
 use super::lane_vectors::{origin, splat, to_child, to_parent_add, turn, turn_back};
 use super::motion::Motion;
 use super::recursion::State;
@@ -82,20 +83,8 @@ impl Group for Gravity<'_> {
         );
         for i in 0..bodies.len() {
             let (body, state) = (&bodies[i], &states[i]);
-            for k in 0..3 {
-                let axis = match body.parent {
-                    Some(parent) => composites[parent].axes[k],
-                    None => splat(s, super::spatial::IDENTITY[k]),
-                };
-                let turned = to_child(s, body, axis);
-                composites[i].axes[k] = if body.prismatic {
-                    turned
-                } else {
-                    turn_back(s, state.cos, state.sin, turned)
-                };
-            }
-            composites[i].mass = s.splat_f64s(body.moments.mass);
-            composites[i].first = splat(s, body.moments.first);
+            let parent = body.parent.map(|parent| &composites[parent]);
+            composites[i] = alone(s, body, parent, state);
         }
         for i in (0..bodies.len()).rev() {
             let (body, state) = (&bodies[i], &states[i]);
@@ -128,5 +117,33 @@ impl Group for Gravity<'_> {
             }
             above.mass = s.add_f64s(above.mass, mass);
         }
+    }
+}
+
+/// A body by itself, with the base's axes turned on from its parent's.
+#[inline(always)]
+fn alone<S: Simd>(
+    s: S,
+    body: &Body,
+    parent: Option<&Composite<S::f64s>>,
+    state: &State<S::f64s>,
+) -> Composite<S::f64s> {
+    let mut axes = [[s.splat_f64s(0.0); 3]; 3];
+    for k in 0..3 {
+        let axis = match parent {
+            Some(parent) => parent.axes[k],
+            None => splat(s, super::spatial::IDENTITY[k]),
+        };
+        let turned = to_child(s, body, axis);
+        axes[k] = if body.prismatic {
+            turned
+        } else {
+            turn_back(s, state.cos, state.sin, turned)
+        };
+    }
+    Composite {
+        axes,
+        mass: s.splat_f64s(body.moments.mass),
+        first: splat(s, body.moments.first),
     }
 }

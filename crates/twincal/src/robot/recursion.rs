@@ -141,7 +141,12 @@ pub(crate) fn move_body<S: Simd>(
         wd[2] = s.add_f64s(wd[2], qdd);
         w[2] = s.add_f64s(w[2], qd);
     }
-    // B = [ω̇]× + ω ωᵀ − |ω|² E
+    (state.w, state.wd, state.a, state.b) = (w, wd, a, relative_acceleration(s, w, wd));
+}
+
+/// B = [ω̇]× + ω ωᵀ − |ω|² E: a point p accelerates by B p beyond the origin.
+#[inline(always)]
+fn relative_acceleration<S: Simd>(s: S, w: [S::f64s; 3], wd: [S::f64s; 3]) -> [[S::f64s; 3]; 3] {
     let (xx, yy, zz) = (
         s.mul_f64s(w[0], w[0]),
         s.mul_f64s(w[1], w[1]),
@@ -152,7 +157,7 @@ pub(crate) fn move_body<S: Simd>(
         s.mul_f64s(w[0], w[2]),
         s.mul_f64s(w[1], w[2]),
     );
-    let b = [
+    [
         [
             s.neg_f64s(s.add_f64s(yy, zz)),
             s.sub_f64s(xy, wd[2]),
@@ -168,8 +173,7 @@ pub(crate) fn move_body<S: Simd>(
             s.add_f64s(yz, wd[0]),
             s.neg_f64s(s.add_f64s(xx, yy)),
         ],
-    ];
-    (state.w, state.wd, state.a, state.b) = (w, wd, a, b);
+    ]
 }
 
 /// Force and moment that the body's own mass needs.

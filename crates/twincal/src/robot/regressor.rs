@@ -8,6 +8,7 @@
 
 use super::Robot;
 use super::block::{Angles, BLOCK, Instructions, Registers, STRIDE};
+use super::bodies::Body;
 use super::lane_vectors::{
     V3, all_to_child, cross, cross_add, dot, dot_add, load, origin, store, turn_back,
 };
@@ -387,17 +388,11 @@ impl<K: Sink> pulp::WithSimd for Kernel<'_, K> {
                 move_body(s, body, gravity, body.parent.map(|p| &before[p]), state);
                 let p = origin(s, body, state.position);
                 for pair in regressor.starts[i]..regressor.starts[i + 1] {
-                    // u' = Rᵀ u, v' = Rᵀ (v + u × p), then the body's own joint
-                    let [mut u, mut v] = [[zero; 3]; 2];
-                    if let Some(parent) = regressor.parents[pair] {
-                        Line([u, v]) = axes[parent];
-                        v = cross_add(s, u, p, v);
-                        [u, v] = all_to_child(s, body, [u, v]);
-                        if !body.prismatic {
-                            u = turn_back(s, state.cos, state.sin, u);
-                            v = turn_back(s, state.cos, state.sin, v);
-                        }
-                    }
+                    let [mut u, mut v] = match regressor.parents[pair] {
+                        Some(parent) => turned_on(s, body, state, p, axes[parent].0),
+                        None => [[zero; 3]; 2],
+                    };
+                    // Then the body's own joint.
                     let own = s.mul_f64s(live, s.splat_f64s(regressor.own[pair]));
                     if body.prismatic {
                         v[2] = s.add_f64s(v[2], own);
@@ -418,6 +413,25 @@ impl<K: Sink> pulp::WithSimd for Kernel<'_, K> {
             first = last;
         }
     }
+}
+
+/// The line of a pair's parent seen from the body, whose origin is at `p` in the parent's frame.
+#[inline(always)]
+fn turned_on<S: Simd>(
+    s: S,
+    body: &Body,
+    state: &State<S::f64s>,
+    p: V3<S>,
+    [u, v]: [V3<S>; 2],
+) -> [V3<S>; 2] {
+    // u' = Rᵀ u, v' = Rᵀ (v + u × p)
+    let v = cross_add(s, u, p, v);
+    let [u, v] = all_to_child(s, body, [u, v]);
+    if body.prismatic {
+        return [u, v];
+    }
+    let (c, n) = (state.cos, state.sin);
+    [turn_back(s, c, n, u), turn_back(s, c, n, v)]
 }
 
 /// The ten columns of one pair, by parameter.

@@ -5,6 +5,7 @@ use super::{Form, JointRows, MAX_BLOCK, PARTS_APART, RowBlock, Slice};
 use crate::error::Result;
 use crate::signal::Segment;
 use crate::signal::interpolate::Place;
+use std::ops::Range;
 
 /// Motion at the stamps of a log whose segment has another clock: the filtered motion, interpolated. The filter leaves nothing
 /// above f_q, so the error is far below that of the filter.
@@ -58,27 +59,12 @@ pub(super) fn visit(
         Some(logged) => (&logged.time, &logged.input_rows, &logged.tau),
         None => (&segment.time, &segment.input_rows, &segment.tau),
     };
-    let (total, samples) = (time.len(), segment.time.len());
+    let total = time.len();
     let mut stretch = Stretch::new(dof);
     let mut from = slice.rows.start;
     while from < slice.rows.end {
         let len = MAX_BLOCK.min(slice.rows.end - from);
-        let own = from..from + len;
-        let still: Vec<bool> = if segment.logged.is_some() {
-            let at = AtStamps::new(segment, &time[own.clone()]);
-            stretch.len = len;
-            for (to, values) in stretch.channels().into_iter().zip(channels(segment)) {
-                at.of(values, samples, to);
-            }
-            at.standstill(&segment.standstill, samples)
-        } else {
-            stretch.load(from, len, total, channels(segment));
-            let joints = segment.standstill.chunks_exact(total);
-            joints
-                .flat_map(|joint| &joint[own.clone()])
-                .copied()
-                .collect()
-        };
+        let still = load(&mut stretch, segment, from..from + len);
         let stride = match form {
             Form::Columns => len,
             Form::Parts => PARTS_APART,
@@ -117,4 +103,23 @@ pub(super) fn visit(
         from += len;
     }
     Ok(())
+}
+
+/// Loads the motion of logged samples of a segment; whether each joint stands still there.
+fn load(stretch: &mut Stretch, segment: &Segment, rows: Range<usize>) -> Vec<bool> {
+    let samples = segment.time.len();
+    if let Some(logged) = &segment.logged {
+        let at = AtStamps::new(segment, &logged.time[rows.clone()]);
+        stretch.len = rows.len();
+        for (to, values) in stretch.channels().into_iter().zip(channels(segment)) {
+            at.of(values, samples, to);
+        }
+        return at.standstill(&segment.standstill, samples);
+    }
+    stretch.load(rows.start, rows.len(), samples, channels(segment));
+    let joints = segment.standstill.chunks_exact(samples);
+    joints
+        .flat_map(|joint| &joint[rows.clone()])
+        .copied()
+        .collect()
 }

@@ -11,6 +11,8 @@ const WINDOW: f64 = 0.5;
 
 /// Squared correlation of velocity and change of position from which the two are one motion.
 const SAME_MOTION: f64 = 0.99;
+/// Independent samples below which a factor is not told: a second of motion looks like one of its five columns by chance.
+pub(super) const LEAST_INDEPENDENT: f64 = 90.0;
 
 /// Motion and torque at a few samples, averaged alike over half a period of the cut-off.
 #[derive(Debug, Clone, PartialEq, Default)]

@@ -106,18 +106,7 @@ pub(super) fn fit(
     if rows.is_empty() || width == 0 {
         return None;
     }
-    let mut gram = vec![0.0; width * width];
-    let mut right = vec![0.0; width];
-    for rows in &rows {
-        for (row, torque) in rows.matrix.chunks(width).zip(&rows.torque) {
-            for i in 0..width {
-                right[i] += row[i] * torque;
-                for j in 0..width {
-                    gram[i * width + j] += row[i] * row[j];
-                }
-            }
-        }
-    }
+    let (gram, right) = normal_equations(&rows, width);
     let solved = Solved::of(&gram, width)?;
     let values = solved.times(&right);
     let mut scores = vec![vec![0.0; width]; STRETCHES];
@@ -152,6 +141,23 @@ pub(super) fn fit(
         values,
         information: gram,
     })
+}
+
+/// Σ x xᵀ and Σ x τ over the rows of all joints.
+fn normal_equations(rows: &[Rows], width: usize) -> (Vec<f64>, Vec<f64>) {
+    let mut gram = vec![0.0; width * width];
+    let mut right = vec![0.0; width];
+    for rows in rows {
+        for (row, torque) in rows.matrix.chunks(width).zip(&rows.torque) {
+            for i in 0..width {
+                right[i] += row[i] * torque;
+                for j in 0..width {
+                    gram[i * width + j] += row[i] * row[j];
+                }
+            }
+        }
+    }
+    (gram, right)
 }
 
 /// A Gram matrix with columns of size one, solved.

@@ -57,6 +57,17 @@ impl Joint {
         self.parts - 1
     }
 
+    /// A column of a body's inertia, of the entries that act on this joint.
+    fn inertial_column(&mut self, ways: &[Sum; 2], acts: impl Fn(Entry) -> bool) {
+        let acting = |way: &Sum| {
+            let own = way.iter().filter(|(entry, _)| acts(*entry));
+            own.copied().collect()
+        };
+        self.inertial
+            .push((self.columns.len(), [acting(&ways[0]), acting(&ways[1])]));
+        self.columns.push(Vec::new());
+    }
+
     /// Makes the inertial columns of the fewest entries; which these are, with their parts.
     fn settle(&mut self) -> BTreeMap<Entry, usize> {
         let entries = |way: usize| {
@@ -103,16 +114,8 @@ impl Parts {
                 (Torque::Model(&ModelColumn::Inertia { body, weights }, on), Some(model)) => {
                     let ways = ways(model.robot(), body, &weights);
                     for &joint in on {
-                        let acting = |way: &Sum| {
-                            let own = way
-                                .iter()
-                                .filter(|((body, k), _)| model.acts(joint, *body, *k));
-                            own.copied().collect()
-                        };
-                        let own = &mut all[joint];
-                        own.inertial
-                            .push((own.columns.len(), [acting(&ways[0]), acting(&ways[1])]));
-                        own.columns.push(Vec::new());
+                        let acts = |(body, k): Entry| model.acts(joint, body, k);
+                        all[joint].inertial_column(&ways, acts);
                     }
                 }
                 (Torque::Model(other, on), _) => {

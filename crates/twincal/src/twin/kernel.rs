@@ -248,24 +248,16 @@ fn evaluate(constants: &Constants<'_>, scratch: &Scratch, y: &Lane) -> [Lane; 3]
 /// [`crate::posterior::mixture`].
 #[inline(always)]
 fn quantile(constants: &Constants<'_>, scratch: &Scratch, level: Level) -> Lane {
-    let (mut low, mut high) = ([f64::INFINITY; LANES], [f64::NEG_INFINITY; LANES]);
-    let (mut narrowest, mut widest) = ([f64::INFINITY; LANES], [0.0_f64; LANES]);
-    let (mut mean, mut square) = ([0.0; LANES], [0.0; LANES]);
     let components = &constants.joint.components;
     let anchor = &scratch.locations[components[0].geometry];
-    for (component, scale) in components.iter().zip(&scratch.scales) {
-        let location = &scratch.locations[component.geometry];
-        for lane in 0..LANES {
-            let own = location[lane] + scale[lane] * level.standard;
-            low[lane] = low[lane].min(own);
-            high[lane] = high[lane].max(own);
-            narrowest[lane] = narrowest[lane].min(scale[lane]);
-            widest[lane] = widest[lane].max(scale[lane]);
-            let shift = location[lane] - anchor[lane];
-            mean[lane] += component.weight * shift;
-            square[lane] += component.weight * (shift * shift + scale[lane] * scale[lane]);
-        }
-    }
+    let Bracket {
+        mut low,
+        mut high,
+        narrowest,
+        widest,
+        mean,
+        square,
+    } = Bracket::of(constants, scratch, level, anchor);
     if components.len() == 1 {
         return low;
     }
@@ -301,12 +293,7 @@ fn quantile(constants: &Constants<'_>, scratch: &Scratch, level: Level) -> Lane 
             };
             let step = (next - y[lane]).abs();
             y[lane] = next;
-            let accepted = tail
-                * if narrowest[lane] > 0.1 * widest[lane] {
-                    1e-4
-                } else {
-                    1e-13
-                };
+            let accepted = tail * accuracy(narrowest[lane], widest[lane]);
             done[lane] =
                 (inside && excess.abs() <= accepted) || step <= 4.0 * f64::EPSILON * next.abs();
         }
@@ -315,4 +302,57 @@ fn quantile(constants: &Constants<'_>, scratch: &Scratch, level: Level) -> Lane 
         }
     }
     y
+}
+
+/// Error in probability with which a quantile is accepted, as a share of the tail; scales of components from `narrowest` to `widest`.
+#[inline(always)]
+fn accuracy(narrowest: f64, widest: f64) -> f64 {
+    if narrowest > 0.1 * widest {
+        1e-4
+    } else {
+        1e-13
+    }
+}
+
+/// Where the quantile of a mixture lies, lane by lane.
+struct Bracket {
+    /// The components' own quantiles: the least and the largest.
+    low: Lane,
+    high: Lane,
+    /// Scales of the components: the least and the largest.
+    narrowest: Lane,
+    widest: Lane,
+    /// Moments of the mixture about the anchor.
+    mean: Lane,
+    square: Lane,
+}
+
+impl Bracket {
+    #[inline(always)]
+    fn of(constants: &Constants<'_>, scratch: &Scratch, level: Level, anchor: &Lane) -> Self {
+        let (mut low, mut high) = ([f64::INFINITY; LANES], [f64::NEG_INFINITY; LANES]);
+        let (mut narrowest, mut widest) = ([f64::INFINITY; LANES], [0.0_f64; LANES]);
+        let (mut mean, mut square) = ([0.0; LANES], [0.0; LANES]);
+        for (component, scale) in constants.joint.components.iter().zip(&scratch.scales) {
+            let location = &scratch.locations[component.geometry];
+            for lane in 0..LANES {
+                let own = location[lane] + scale[lane] * level.standard;
+                low[lane] = low[lane].min(own);
+                high[lane] = high[lane].max(own);
+                narrowest[lane] = narrowest[lane].min(scale[lane]);
+                widest[lane] = widest[lane].max(scale[lane]);
+                let shift = location[lane] - anchor[lane];
+                mean[lane] += component.weight * shift;
+                square[lane] += component.weight * (shift * shift + scale[lane] * scale[lane]);
+            }
+        }
+        Self {
+            low,
+            high,
+            narrowest,
+            widest,
+            mean,
+            square,
+        }
+    }
 }

@@ -276,27 +276,14 @@ impl Predictor {
                     correction[lane] += joint.mean[i] * column[lane];
                 }
             }
-            let still = |row: usize| input.standstill.get(row).copied().unwrap_or(false);
-            let band: Lane = std::array::from_fn(|lane| {
-                if still(row_of(lane)) {
-                    joint.coulomb
-                } else {
-                    0.0
-                }
-            });
+            let band: Lane = std::array::from_fn(|lane| joint.stiction(input, row_of(lane)));
             let spread: Lane = std::array::from_fn(|lane| joint.spread(input, row_of(lane)));
             let constant =
                 |row: usize| input.nominal[row] + input.products.get(row).copied().unwrap_or(0.0);
             let residual: Option<Lane> = (!input.measured.is_empty()).then(|| {
                 std::array::from_fn(|lane| input.measured[row_of(lane)] - constant(row_of(lane)))
             });
-            let Bands {
-                low,
-                high,
-                epistemic,
-                pit,
-                density,
-            } = arch.dispatch(Group {
+            let bands: Bands = arch.dispatch(Group {
                 constants,
                 scratch: &mut scratch,
                 x: &x,
@@ -309,17 +296,17 @@ impl Predictor {
                 let constant = constant(row);
                 torque.nominal.push(input.nominal[row]);
                 torque.calibrated.push(constant + correction[lane]);
-                torque.low.push(constant + low[lane]);
-                torque.high.push(constant + high[lane]);
-                torque.epistemic.push(epistemic[lane].sqrt());
+                torque.low.push(constant + bands.low[lane]);
+                torque.high.push(constant + bands.high[lane]);
+                torque.epistemic.push(bands.epistemic[lane].sqrt());
                 let noise = noise(spread[lane]);
                 torque.noise.push(noise.sqrt());
                 let new_motion = joint.leaves_hull(input, row);
                 torque.new_motion.push(new_motion);
-                (torque.extrapolating).push(new_motion || epistemic[lane] > noise);
+                (torque.extrapolating).push(new_motion || bands.epistemic[lane] > noise);
                 if residual.is_some() {
-                    torque.pit.push(pit[lane]);
-                    torque.log_density.push(density[lane].ln());
+                    torque.pit.push(bands.pit[lane]);
+                    torque.log_density.push(bands.density[lane].ln());
                 }
             }
         }
@@ -332,6 +319,15 @@ impl Joint {
     fn spread(&self, input: &JointInput<'_>, row: usize) -> f64 {
         let velocity = input.motion[1].get(row);
         velocity.map_or(1.0, |v| self.spread.at(*v, input.nominal[row]))
+    }
+
+    /// Torque that stiction holds either way in a row, N·m; 0 where the joint moves.
+    fn stiction(&self, input: &JointInput<'_>, row: usize) -> f64 {
+        if input.standstill.get(row).copied().unwrap_or(false) {
+            self.coulomb
+        } else {
+            0.0
+        }
     }
 
     fn leaves_hull(&self, input: &JointInput<'_>, row: usize) -> bool {

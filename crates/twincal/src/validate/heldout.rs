@@ -69,6 +69,29 @@ struct Collected {
     stretches: Vec<Vec<f64>>,
 }
 
+impl Collected {
+    /// Adds the rows of one joint of a block.
+    fn extend(&mut self, joint: usize, block: &RowBlock<'_>, torque: &JointTorque) {
+        let rows = &block.joints[joint];
+        let own = joint * block.len..(joint + 1) * block.len;
+        let (measured, standstill) = (rows.measured, rows.standstill);
+        self.stretches[joint].extend(measured.iter().enumerate().map(|(row, &y)| {
+            stretch(torque.low[row], torque.calibrated[row], torque.high[row], y)
+        }));
+        self.traces[joint].extend(
+            self.rows,
+            &TraceRows {
+                time: block.time,
+                q: &block.q[own.clone()],
+                qd: &block.qd[own],
+                measured,
+                standstill,
+                torque,
+            },
+        );
+    }
+}
+
 impl HeldOut {
     /// Nothing seen yet, for joints of these names.
     pub fn new(joints: impl IntoIterator<Item = impl Into<String>>) -> Self {
@@ -118,26 +141,7 @@ impl HeldOut {
             if whole {
                 said.extend(without_incidents(twin, &mut trajectory));
             }
-            let signal = RowSignal::Filtered;
-            let slices = slices(
-                &twin.pipeline,
-                &trajectory,
-                signal,
-                f64::NEG_INFINITY,
-                usize::MAX,
-            );
-            visit_slices(
-                &twin.robot,
-                library,
-                &twin.pipeline,
-                &trajectory,
-                signal,
-                &slices,
-                &mut |block| {
-                    self.push_filtered(block, predictor.into(), &mut collected);
-                    Ok(())
-                },
-            )?;
+            self.push_part((twin, library, predictor), &trajectory, &mut collected)?;
             seen(&trajectory)?;
             Ok(trajectory)
         };
@@ -164,6 +168,35 @@ impl HeldOut {
             predictor,
             &trajectory,
             f64::NEG_INFINITY,
+        )
+    }
+
+    /// The filtered rows of a log or of one of its chapters.
+    fn push_part(
+        &mut self,
+        (twin, library, predictor): (&Twin, &Library, &Predictor),
+        trajectory: &Trajectory,
+        collected: &mut Collected,
+    ) -> Result<()> {
+        let signal = RowSignal::Filtered;
+        let slices = slices(
+            &twin.pipeline,
+            trajectory,
+            signal,
+            f64::NEG_INFINITY,
+            usize::MAX,
+        );
+        visit_slices(
+            &twin.robot,
+            library,
+            &twin.pipeline,
+            trajectory,
+            signal,
+            &slices,
+            &mut |block| {
+                self.push_filtered(block, predictor.into(), collected);
+                Ok(())
+            },
         )
     }
 
@@ -278,7 +311,6 @@ impl HeldOut {
         let friction: Option<Vec<JointTorque>> = predictors.friction.map(rival);
         for (joint, torque) in torques.iter().enumerate() {
             let rows = &block.joints[joint];
-            let own = joint * block.len..(joint + 1) * block.len;
             let (measured, standstill) = (rows.measured, rows.standstill);
             self.filtered.push(joint, measured, torque);
             self.moving
@@ -311,20 +343,7 @@ impl HeldOut {
                 self.rivals
                     .push(measured, torque, &compact[joint], |row| !standstill[row]);
             }
-            collected.stretches[joint].extend(measured.iter().enumerate().map(|(row, &y)| {
-                stretch(torque.low[row], torque.calibrated[row], torque.high[row], y)
-            }));
-            collected.traces[joint].extend(
-                collected.rows,
-                &TraceRows {
-                    time: block.time,
-                    q: &block.q[own.clone()],
-                    qd: &block.qd[own],
-                    measured,
-                    standstill,
-                    torque,
-                },
-            );
+            collected.extend(joint, block, torque);
         }
         collected.rows += block.len;
     }

@@ -54,7 +54,38 @@ pub(super) fn changes(
     gravity: Option<[f64; 3]>,
 ) -> Result<(Vec<LinkChange>, Option<Projection>)> {
     let robot = &writer.calibration.twin.robot;
-    let mut links: Vec<Link<'_>> = Vec::new();
+    let links = found(writer, held, beta);
+    let twin = &writer.calibration.twin;
+    // In the file changed inertias meet changed gravity.
+    let torque = || {
+        let mut description = robot.description().clone();
+        description.gravity = gravity.unwrap_or(description.gravity);
+        let (robot, _) = Robot::new(description, robot.locked())?;
+        let states = writer.states.motion();
+        Ok(torque_metric(&robot, &twin.noise, states, &links))
+    };
+    let (parameters, projection) = project(&links, torque)?;
+    let mut changes: Vec<LinkChange> = Vec::new();
+    for link in &robot.description().links {
+        let Some(index) = links.iter().position(|own| own.name == link.name) else {
+            continue;
+        };
+        if let Some(after) = inertia_of(&parameters[index]) {
+            changes.push(LinkChange {
+                link: link.name.clone(),
+                before: link.inertia,
+                after,
+                no_body: (projection.iter()).any(|p| p.links.contains(&link.name)),
+            });
+        }
+    }
+    Ok((changes, projection))
+}
+
+/// Links that `held` columns change, with the parameters that they change them to, physical or not.
+fn found<'w>(writer: &'w Writer<'_>, held: &[Option<Place>], beta: &[f64]) -> Vec<Link<'w>> {
+    let robot = &writer.calibration.twin.robot;
+    let mut links: Vec<Link<'w>> = Vec::new();
     for (column, place) in held.iter().enumerate() {
         let Some(Place::Inertia { body, weights }) = place else {
             continue;
@@ -82,31 +113,7 @@ pub(super) fn changes(
             *found += beta[column] * change.sum::<f64>();
         }
     }
-    let twin = &writer.calibration.twin;
-    // In the file changed inertias meet changed gravity.
-    let torque = || {
-        let mut description = robot.description().clone();
-        description.gravity = gravity.unwrap_or(description.gravity);
-        let (robot, _) = Robot::new(description, robot.locked())?;
-        let states = writer.states.motion();
-        Ok(torque_metric(&robot, &twin.noise, states, &links))
-    };
-    let (parameters, projection) = project(&links, torque)?;
-    let mut changes: Vec<LinkChange> = Vec::new();
-    for link in &robot.description().links {
-        let Some(index) = links.iter().position(|own| own.name == link.name) else {
-            continue;
-        };
-        if let Some(after) = inertia_of(&parameters[index]) {
-            changes.push(LinkChange {
-                link: link.name.clone(),
-                before: link.inertia,
-                after,
-                no_body: (projection.iter()).any(|p| p.links.contains(&link.name)),
-            });
-        }
-    }
-    Ok((changes, projection))
+    links
 }
 
 /// The outer frame seen from the inner one.

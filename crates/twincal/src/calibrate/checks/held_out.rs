@@ -135,25 +135,39 @@ pub(in crate::calibrate) fn validate(
             friction: friction.as_ref(),
         };
         for left_out in &fold.held_out {
-            let LeftOut { rows, motion, from } = *left_out;
-            let mut own = HeldOut::new(twin.robot.joint_names());
-            own.score_kept(predictors, rows, from);
-            own.score_raw(
-                &twin.robot,
-                library,
-                &twin.pipeline,
-                predictors.twin,
-                motion,
-                from,
-            )?;
+            let own = scored((twin, library), predictors, *left_out)?;
             if plan.split == Split::HeldoutLogs {
                 let memory: Vec<f64> = average.noise.iter().map(JointNoise::memory).collect();
-                findings.extend(another_state::finding(&rows.log, &own.within(), &memory));
+                findings.extend(another_state::finding(
+                    &left_out.rows.log,
+                    &own.within(),
+                    &memory,
+                ));
             }
             held_out += own;
         }
     }
     Ok((held_out.finish(plan.split), findings))
+}
+
+/// Scores on what is left out of one log.
+fn scored(
+    (twin, library): (&Twin, &Library),
+    predictors: Predictors<'_>,
+    left_out: LeftOut<'_>,
+) -> Result<HeldOut> {
+    let LeftOut { rows, motion, from } = left_out;
+    let mut own = HeldOut::new(twin.robot.joint_names());
+    own.score_kept(predictors, rows, from);
+    own.score_raw(
+        &twin.robot,
+        library,
+        &twin.pipeline,
+        predictors.twin,
+        motion,
+        from,
+    )?;
+    Ok(own)
 }
 
 /// Whether some joint has as many independent rows as a result needs.

@@ -88,6 +88,31 @@ struct Folds {
     needed: f64,
 }
 
+impl Folds {
+    /// From what the error of every block falls by, and the error without what is judged.
+    fn judged(&self, gained: &[f64], error: f64) -> LeftOutError {
+        let count = gained.len() as f64;
+        let mean = gained.iter().sum::<f64>() / count;
+        let square: f64 = gained.iter().map(|g| (g - mean) * (g - mean)).sum();
+        let sds = mean / (square / (count - 1.0) / count).sqrt();
+        LeftOutError {
+            left_out: self.kind,
+            blocks: gained.len(),
+            lowered: if error > 0.0 {
+                count * mean / error
+            } else {
+                0.0
+            },
+            standard_errors: if sds.is_nan() {
+                0.0
+            } else {
+                sds.clamp(-MOST_SDS, MOST_SDS)
+            },
+            needed: self.needed,
+        }
+    }
+}
+
 impl LeftOut {
     /// Grams of stretches of the logs over the columns of the components `inside`, weighted as in the likelihood of `fit`:
     ///
@@ -206,25 +231,7 @@ impl LeftOut {
                 error += sums[sums.len() - 1] - difference(sums, &b0, &nothing);
             }
         }
-        let count = gained.len() as f64;
-        let mean = gained.iter().sum::<f64>() / count;
-        let square: f64 = gained.iter().map(|g| (g - mean) * (g - mean)).sum();
-        let sds = mean / (square / (count - 1.0) / count).sqrt();
-        Some(LeftOutError {
-            left_out: folds.kind,
-            blocks: gained.len(),
-            lowered: if error > 0.0 {
-                count * mean / error
-            } else {
-                0.0
-            },
-            standard_errors: if sds.is_nan() {
-                0.0
-            } else {
-                sds.clamp(-MOST_SDS, MOST_SDS)
-            },
-            needed: folds.needed,
-        })
+        Some(folds.judged(&gained, error))
     }
 
     /// Fold by fold, the columns `inside` whose component it alone shows.

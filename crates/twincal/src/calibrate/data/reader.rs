@@ -104,13 +104,7 @@ impl Reader<'_> {
         let observations = room.into_rows();
         let cold = |(warm, rows): (&bool, &JointObservations)| *warm && rows.temperature.is_empty();
         if warm.iter().zip(&observations.joints).any(cold) {
-            findings.push(Finding::new(
-                Severity::Warning,
-                Code::TemperatureLeftOut,
-                &long.log.name,
-                "a temperature is missing in some chapters and was left out of all: drift is not compared with it",
-                0,
-            ));
+            findings.push(temperature_left_out(&long.log.name));
         }
         let ends = ends.unwrap_or_default();
         let summary = LogSummary::joined(summaries, ends[1] - ends[0]);
@@ -190,4 +184,15 @@ impl Reader<'_> {
         leave_out(self.pipeline, &mut trajectory, incidents);
         observe(self.robot, self.library, self.pipeline, &trajectory)
     }
+}
+
+/// That some chapters of a log lack a temperature which others have.
+fn temperature_left_out(log: &str) -> Finding {
+    Finding::new(
+        Severity::Warning,
+        Code::TemperatureLeftOut,
+        log,
+        "a temperature is missing in some chapters and was left out of all: drift is not compared with it",
+        0,
+    )
 }

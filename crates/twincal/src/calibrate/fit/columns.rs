@@ -19,19 +19,7 @@ pub(crate) fn columns_of(
     payload_apart: bool,
 ) -> Result<Columns> {
     let forced = &settings.prior.forced;
-    let mut columns = Columns {
-        names: Vec::new(),
-        component: Vec::new(),
-        family: Vec::new(),
-        families: Vec::new(),
-        prior_sd: library.prior_sds(),
-        lower: Vec::new(),
-        forced: Vec::new(),
-        parent: Vec::new(),
-        second_choice: Vec::new(),
-        one_motion: false,
-        halves: Vec::new(),
-    };
+    let mut columns = none_yet(library.prior_sds());
     let mut named = Vec::new();
     let mut unknown: Vec<&String> = forced.iter().collect();
     let mut last = None;
@@ -75,12 +63,33 @@ pub(crate) fn columns_of(
     heredity::force_parents(&columns.parent, &mut columns.forced);
     match unknown.first() {
         None => Ok(columns),
-        Some(name) => Err(Error::Setting {
-            key: "prior.forced".into(),
-            problem: format!("no candidate `{name}` with torque of its own in these logs"),
-            remedy:
-                "give names of components as `twincal fit` prints them, such as \"elbow.viscous\""
-                    .into(),
-        }),
+        Some(name) => Err(unknown_forced(name)),
+    }
+}
+
+/// No columns, before those of these prior sds are added.
+fn none_yet(prior_sd: Vec<Option<f64>>) -> Columns {
+    Columns {
+        names: Vec::new(),
+        component: Vec::new(),
+        family: Vec::new(),
+        families: Vec::new(),
+        prior_sd,
+        lower: Vec::new(),
+        forced: Vec::new(),
+        parent: Vec::new(),
+        second_choice: Vec::new(),
+        one_motion: false,
+        halves: Vec::new(),
+    }
+}
+
+/// The error for a component that is forced in and has no column.
+fn unknown_forced(name: &str) -> Error {
+    Error::Setting {
+        key: "prior.forced".into(),
+        problem: format!("no candidate `{name}` with torque of its own in these logs"),
+        remedy: "give names of components as `twincal fit` prints them, such as \"elbow.viscous\""
+            .into(),
     }
 }

@@ -79,6 +79,12 @@ pub(in crate::calibrate) fn parents(
             parent[c + 1] = Some(c);
         }
     }
+    refuse_circles(components, &parent)?;
+    Ok(parent)
+}
+
+/// An error for a component that is its own ancestor.
+fn refuse_circles(components: &[Named<'_>], parent: &[Option<usize>]) -> Result<()> {
     for (c, component) in components.iter().enumerate() {
         let up = std::iter::successors(parent[c], |&p| parent[p]).take(components.len());
         if up.into_iter().any(|p| p == c) {
@@ -89,7 +95,7 @@ pub(in crate::calibrate) fn parents(
             });
         }
     }
-    Ok(parent)
+    Ok(())
 }
 
 /// What is forced in brings what it needs.

@@ -225,17 +225,7 @@ impl Trial<'_> {
 
     /// A fit with all components in, plug-ins as in `like` or at their fixed point, and what it leaves.
     fn fitted(&self, library: &Library, like: Option<&Fit>) -> Result<Option<(Vec<Left>, Fit)>> {
-        let mut logs: Vec<Observations> = (self.trajectories.iter())
-            .map(|trajectory| observe(self.robot, library, self.pipeline, trajectory))
-            .collect::<Result<_>>()?;
-        let mut zero = zero_columns(logs.iter(), library);
-        zero.extend(hysteresis(library));
-        zero.sort_unstable();
-        zero.dedup();
-        for log in &mut logs {
-            log.drop_columns(&zero);
-        }
-        let library = library.without_columns(&zero);
+        let (logs, library) = self.observed(library)?;
         let parts: Vec<Part<'_>> = logs.iter().map(Observations::whole).collect();
         let joints = 0..self.robot.dof();
         let moves = |joint: usize| parts.iter().any(|part| part.moving_rows(joint) > 0.0);
@@ -288,6 +278,21 @@ impl Trial<'_> {
             }
         };
         Ok(Some((joints.map(of_joint).collect(), fit)))
+    }
+
+    /// The rows of the stretches, and the library of the columns that act there.
+    fn observed(&self, library: &Library) -> Result<(Vec<Observations>, Library)> {
+        let mut logs: Vec<Observations> = (self.trajectories.iter())
+            .map(|trajectory| observe(self.robot, library, self.pipeline, trajectory))
+            .collect::<Result<_>>()?;
+        let mut zero = zero_columns(logs.iter(), library);
+        zero.extend(hysteresis(library));
+        zero.sort_unstable();
+        zero.dedup();
+        for log in &mut logs {
+            log.drop_columns(&zero);
+        }
+        Ok((logs, library.without_columns(&zero)))
     }
 }
 

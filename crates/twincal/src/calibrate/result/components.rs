@@ -5,7 +5,7 @@ use super::drive_scale::DriveScale;
 use super::status::{Status, StatusReason, by_probability};
 use crate::posterior::draws::{CoefficientDraws, Drawer};
 use crate::posterior::{Model, Posterior};
-use crate::term::{Before, Component, Estimate, Library};
+use crate::term::{Before, Component, Estimate, Library, Parameter};
 use rayon::prelude::*;
 
 /// Draws that the parameters are worked out from.
@@ -166,54 +166,63 @@ fn parameters(
         .into_iter()
         .enumerate()
         .map(|(p, parameter)| {
-            let mut column: Vec<f64> = values.iter().map(|row| row[p]).collect();
-            column.sort_by(f64::total_cmp);
-            let count = column.len() as f64;
-            let quantile = |level: f64| {
-                let place = (level * (count - 1.0)).round().max(0.0) as usize;
-                column.get(place).copied().unwrap_or(f64::NAN)
-            };
-            // A coefficient has exact moments. A ratio of coefficients has none where its denominator can be near zero.
-            // A parameter stands at the place of its term, or mixes several. Where one of those is no column, its value is not 0 but unknown.
-            let before = library.before(index, p);
+            let mut drawn: Vec<f64> = values.iter().map(|row| row[p]).collect();
+            drawn.sort_by(f64::total_cmp);
             let term = own.get(p).copied();
-            let alone = term.filter(|_| before.is_none());
-            if alone.is_some_and(|term| term.pip.is_none()) || before == Some(Before::Hidden) {
-                return ParameterSummary {
-                    name: parameter.name,
-                    unit: parameter.unit,
-                    mean: f64::NAN,
-                    sd: f64::NAN,
-                    interval95: [f64::NAN; 2],
-                    median: f64::NAN,
-                    interval68: [f64::NAN; 2],
-                    seen: false,
-                };
-            }
-            let exact = term.filter(|_| library.is_coefficient(index, p));
-            let moments = exact.and_then(|term| term.conditional_mean.zip(term.conditional_sd));
-            let quantiles =
-                exact.and_then(|term| term.conditional_median.zip(term.conditional_interval68));
-            let (median, interval68) =
-                quantiles.unwrap_or_else(|| (quantile(0.5), ONE_SD.map(quantile)));
-            let (mean, sd) = moments.unwrap_or((median, 0.5 * (interval68[1] - interval68[0])));
-            ParameterSummary {
-                name: parameter.name,
-                unit: parameter.unit,
-                mean,
-                sd,
-                interval95: [quantile(0.025), quantile(0.975)],
-                median,
-                interval68,
-                seen: match before {
-                    Some(Before::Width(prior)) => sd < UNSEEN * prior,
-                    _ => alone.is_none_or(|term| term.seen),
-                },
-            }
+            parameter_summary(library, (index, p), parameter, term, &drawn)
         })
         .collect();
     identified(library, index, &mut parameters);
     parameters
+}
+
+/// A parameter by its component and its place in it, from its `drawn` values, ascending, and the term at that place.
+fn parameter_summary(
+    library: &Library,
+    (index, p): (usize, usize),
+    parameter: Parameter,
+    term: Option<&TermSummary>,
+    drawn: &[f64],
+) -> ParameterSummary {
+    let count = drawn.len() as f64;
+    let quantile = |level: f64| {
+        let place = (level * (count - 1.0)).round().max(0.0) as usize;
+        drawn.get(place).copied().unwrap_or(f64::NAN)
+    };
+    // A coefficient has exact moments. A ratio of coefficients has none where its denominator can be near zero.
+    // A parameter stands at the place of its term, or mixes several. Where one of those is no column, its value is not 0 but unknown.
+    let before = library.before(index, p);
+    let alone = term.filter(|_| before.is_none());
+    if alone.is_some_and(|term| term.pip.is_none()) || before == Some(Before::Hidden) {
+        return ParameterSummary {
+            name: parameter.name,
+            unit: parameter.unit,
+            mean: f64::NAN,
+            sd: f64::NAN,
+            interval95: [f64::NAN; 2],
+            median: f64::NAN,
+            interval68: [f64::NAN; 2],
+            seen: false,
+        };
+    }
+    let exact = term.filter(|_| library.is_coefficient(index, p));
+    let moments = exact.and_then(|term| term.conditional_mean.zip(term.conditional_sd));
+    let quantiles = exact.and_then(|term| term.conditional_median.zip(term.conditional_interval68));
+    let (median, interval68) = quantiles.unwrap_or_else(|| (quantile(0.5), ONE_SD.map(quantile)));
+    let (mean, sd) = moments.unwrap_or((median, 0.5 * (interval68[1] - interval68[0])));
+    ParameterSummary {
+        name: parameter.name,
+        unit: parameter.unit,
+        mean,
+        sd,
+        interval95: [quantile(0.025), quantile(0.975)],
+        median,
+        interval68,
+        seen: match before {
+            Some(Before::Width(prior)) => sd < UNSEEN * prior,
+            _ => alone.is_none_or(|term| term.seen),
+        },
+    }
 }
 
 /// Of a mass that is open by more than half of itself there is no centre: then first moments are told, else the centre.

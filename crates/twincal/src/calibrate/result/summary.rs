@@ -1,7 +1,9 @@
 //! From posterior to what people read: terms, statuses, groups, sensitivity, autocorrelation.
 
 use super::calibration::ends;
-use super::calibration::{Calibration, Draws, Group, LikelihoodUsed, PriorUsed, TermSummary};
+use super::calibration::{
+    Calibration, ComponentSummary, Draws, Group, LikelihoodUsed, PriorUsed, TermSummary,
+};
 use super::common_gain;
 use super::components::{NOT_SEEN, components};
 use super::drive_scale::{self, DriveScale};
@@ -88,17 +90,7 @@ pub(in crate::calibrate) fn summarise(
     let apart = facts.payload_apart.then(|| library.with_payload_apart());
     let told_apart = apart.as_ref().unwrap_or(library);
     let seed = settings.inference.seed;
-    let mut components = components(told_apart, &fit.posterior, &terms, seed, scale);
-    let told = told_as(&fit.problem, &fit.posterior, told_apart);
-    for (component, told_as) in components.iter_mut().zip(told) {
-        component.told_as = told_as;
-    }
-    let mut groups = groups(&fit.problem, &fit.posterior, told_apart);
-    if pieces.pooled {
-        settle::by_probability(&mut components, &mut groups);
-    } else {
-        settle::settle(&mut components, &mut groups, fit, told_apart, sums);
-    }
+    let (components, groups) = settled(&pieces, told_apart, &terms, scale);
     findings.extend(common_gain::finding(
         &components,
         settings.drive_gain_sd > 0.0,
@@ -128,6 +120,29 @@ pub(in crate::calibrate) fn summarise(
         logs: facts.summaries.clone(),
         findings: std::mem::take(findings),
     })
+}
+
+/// Components and groups with their statuses; `told_apart` is the library, the payload apart from its link where the logs tell it.
+fn settled(
+    pieces: &Pieces<'_>,
+    told_apart: &Library,
+    terms: &[TermSummary],
+    scale: Option<&DriveScale>,
+) -> (Vec<ComponentSummary>, Vec<Group>) {
+    let (fit, sums) = (&pieces.fit, pieces.sums);
+    let seed = pieces.settings.inference.seed;
+    let mut components = components(told_apart, &fit.posterior, terms, seed, scale);
+    let told = told_as(&fit.problem, &fit.posterior, told_apart);
+    for (component, told_as) in components.iter_mut().zip(told) {
+        component.told_as = told_as;
+    }
+    let mut groups = groups(&fit.problem, &fit.posterior, told_apart);
+    if pieces.pooled {
+        settle::by_probability(&mut components, &mut groups);
+    } else {
+        settle::settle(&mut components, &mut groups, fit, told_apart, sums);
+    }
+    (components, groups)
 }
 
 /// Every term, with what blocks of rows and the prior say of it.

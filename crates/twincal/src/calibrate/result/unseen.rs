@@ -36,47 +36,10 @@ pub(in crate::calibrate) fn excitation(
 
 /// Says what is not seen and why: in findings, and in the words of the components.
 pub(in crate::calibrate) fn tell(calibration: &mut Calibration, excitation: &Excitation) {
-    let mut weak: Vec<String> = Vec::new();
-    let mut never: Vec<String> = Vec::new();
-    for (component, excited) in calibration
-        .components
-        .iter_mut()
-        .zip(&excitation.components)
-    {
-        let is_zero = |name: &String| {
-            let term = calibration.terms.iter().find(|t| t.term.name == *name);
-            term.is_some_and(|t| t.term.status == Status::ZeroColumn)
-        };
-        if component.reason == StatusReason::NoColumn && component.columns.iter().any(is_zero) {
-            component.reason = StatusReason::NoTorqueInLogs;
-        }
-        if !component.is_unseen() {
-            continue;
-        }
-        let joints = excitation.unseen.iter().filter(|unseen| {
-            let in_list = |list: &[String]| list.contains(&component.name);
-            in_list(&unseen.nothing_of) || in_list(&unseen.not_apart)
-        });
-        let joints: Vec<String> = joints
-            .filter_map(|unseen| Some(format!("`{}`", unseen.joint.as_ref()?)))
-            .collect();
-        let why = if !joints.is_empty() {
-            format!("move {} more", joints.join(" and "))
-        } else if component.family == Family::Hysteresis {
-            "the joint travels too little in these logs".to_owned()
-        } else if excited.seen == Seen::Never {
-            "no motion of this robot shows it".to_owned()
-        } else if !component.alias_of.is_empty() {
-            never.push(component.name.clone());
-            let others = some(&component.alias_of);
-            format!("in every motion of this robot its torque is also that of {others}")
-        } else {
-            weak.push(component.name.clone());
-            "its torque in these logs is small against the noise: move faster, or log longer"
-                .to_owned()
-        };
-        component.words = format!("{}: not seen: {why}", component.story);
-    }
+    let Hidden {
+        mut weak,
+        mut never,
+    } = reasons(calibration, excitation);
     // What others tell is not lost.
     let unseen: Vec<&String> = calibration.unseen().map(|own| &own.name).collect();
     weak.retain(|name| unseen.contains(&name));
@@ -115,6 +78,60 @@ pub(in crate::calibrate) fn tell(calibration: &mut Calibration, excitation: &Exc
         findings.push(not_seen(message, &never));
     }
     calibration.findings.extend(findings);
+}
+
+/// Names of components that no motion of one joint would show.
+#[derive(Default)]
+struct Hidden {
+    /// Whose torque is small against the noise.
+    weak: Vec<String>,
+    /// Whose torque is that of others in every motion.
+    never: Vec<String>,
+}
+
+/// Why a component is not seen, in its words.
+fn reasons(calibration: &mut Calibration, excitation: &Excitation) -> Hidden {
+    let mut hidden = Hidden::default();
+    for (component, excited) in calibration
+        .components
+        .iter_mut()
+        .zip(&excitation.components)
+    {
+        let is_zero = |name: &String| {
+            let term = calibration.terms.iter().find(|t| t.term.name == *name);
+            term.is_some_and(|t| t.term.status == Status::ZeroColumn)
+        };
+        if component.reason == StatusReason::NoColumn && component.columns.iter().any(is_zero) {
+            component.reason = StatusReason::NoTorqueInLogs;
+        }
+        if !component.is_unseen() {
+            continue;
+        }
+        let joints = excitation.unseen.iter().filter(|unseen| {
+            let in_list = |list: &[String]| list.contains(&component.name);
+            in_list(&unseen.nothing_of) || in_list(&unseen.not_apart)
+        });
+        let joints: Vec<String> = joints
+            .filter_map(|unseen| Some(format!("`{}`", unseen.joint.as_ref()?)))
+            .collect();
+        let why = if !joints.is_empty() {
+            format!("move {} more", joints.join(" and "))
+        } else if component.family == Family::Hysteresis {
+            "the joint travels too little in these logs".to_owned()
+        } else if excited.seen == Seen::Never {
+            "no motion of this robot shows it".to_owned()
+        } else if !component.alias_of.is_empty() {
+            hidden.never.push(component.name.clone());
+            let others = some(&component.alias_of);
+            format!("in every motion of this robot its torque is also that of {others}")
+        } else {
+            hidden.weak.push(component.name.clone());
+            "its torque in these logs is small against the noise: move faster, or log longer"
+                .to_owned()
+        };
+        component.words = format!("{}: not seen: {why}", component.story);
+    }
+    hidden
 }
 
 fn not_seen(message: String, names: &[String]) -> Finding {

@@ -80,15 +80,7 @@ fn visit<S: Simd>(
         inside.fill(simd.splat_f64s(0.0));
     }
     if branches.1 {
-        let c = exclude(simd, m, node, level.center, h);
-        let child = View {
-            s: &node.s[m..],
-            h,
-            c,
-            weight: simd.mul_f64s(node.weight, exclude_odds),
-            stale: true,
-            ..node
-        };
+        let child = without(simd, m, node, (level.center, exclude_odds), h);
         below.sum(simd, tree, child, outside, tally);
     } else {
         outside.fill(simd.splat_f64s(0.0));
@@ -106,6 +98,26 @@ fn visit<S: Simd>(
         outside,
         out,
     );
+}
+
+/// The child without a column, whose coefficient is `center` from there, in the room of its h.
+#[inline(always)]
+fn without<'a, S: Simd>(
+    simd: S,
+    m: usize,
+    node: View<'a, S::f64s>,
+    (center, odds): (S::f64s, S::f64s),
+    h: &'a mut [S::f64s],
+) -> View<'a, S::f64s> {
+    let c = exclude(simd, m, node, center, h);
+    View {
+        s: &node.s[m..],
+        h,
+        c,
+        weight: simd.mul_f64s(node.weight, odds),
+        stale: true,
+        ..node
+    }
 }
 
 /// Sums over the subtree of m columns below `node`.

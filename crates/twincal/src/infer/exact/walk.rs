@@ -2,13 +2,14 @@
 
 use super::near_root::{join, leaves_out, split};
 use super::node::{Node, from_lanes, lanes};
-use super::plan::{Plan, plan};
+use super::plan::{Plan, Top, plan};
 use super::subtree::{descend, scratch_len};
 use super::sums::Layout;
 use super::tally::Tally;
 use super::tree::{LOG_REFERENCE, Root, Tree};
 use crate::infer::standard::Standard;
 use crate::prior::Prior;
+use pulp::bytemuck::Pod;
 use pulp::{Simd, WithSimd};
 
 /// Subtrees of up to this many components (2^14 models in every lane) are one task.
@@ -96,9 +97,39 @@ impl WithSimd for Root<'_> {
 /// The certain columns, then the columns of the first components (3 with eight lanes): lane l includes component d where
 /// bit d of l is set.
 fn root<S: Simd>(simd: S, about: Root<'_>) -> (Vec<f64>, Tally) {
-    let standard = about.standard;
-    let size = standard.size();
     let Plan { tree, top, padded } = plan::<S>(about);
+    let mut node = undecided(simd, about.standard, padded);
+    let mut above = Vec::new();
+    for (d, column) in top.iter().enumerate() {
+        let (mut inside, outside) = split(
+            simd,
+            &tree.levels[padded - d - 1],
+            padded - d,
+            &node,
+            column.odds,
+        );
+        leave_lanes(column, &mut inside, &outside);
+        above.push(std::mem::replace(&mut node, inside));
+    }
+    let (mut sums, tally) = branch(simd, &tree, padded - top.len(), node);
+    for (d, (node, column)) in above.iter().zip(&top).enumerate().rev() {
+        let (inside, outside): (Vec<_>, Vec<_>) =
+            sums.iter().map(|x| sides(simd, column, x)).unzip();
+        sums = join(
+            simd,
+            &tree.levels[padded - d - 1],
+            padded - d,
+            node,
+            &inside,
+            &outside,
+        );
+    }
+    (of_first_lane(&sums, padded, about.standard.size()), tally)
+}
+
+/// The node of `padded` columns before any is decided.
+fn undecided<S: Simd>(simd: S, standard: &Standard, padded: usize) -> Node<S::f64s> {
+    let size = standard.size();
     let mut node = Node::<S::f64s>::blank(padded);
     let pairs = (0..padded).flat_map(|i| (i..padded).map(move |j| (i, j)));
     for (entry, (i, j)) in node.s.iter_mut().zip(pairs) {
@@ -113,68 +144,53 @@ fn root<S: Simd>(simd: S, about: Root<'_>) -> (Vec<f64>, Tally) {
         *h = simd.splat_f64s(*offset);
     }
     (node.weight, node.ceiling) = (simd.splat_f64s(1.0), simd.splat_f64s(1.0));
-    let mut above = Vec::new();
-    for (d, column) in top.iter().enumerate() {
-        let (mut inside, outside) = split(
-            simd,
-            &tree.levels[padded - d - 1],
-            padded - d,
-            &node,
-            column.odds,
-        );
-        let takes = |lane: usize| column.bit.is_none_or(|bit| lane >> bit & 1 == 1);
-        let select = |a: &mut S::f64s, b: &S::f64s| {
-            *a = from_lanes(|lane| {
-                if takes(lane) {
-                    lanes(a)[lane]
-                } else {
-                    lanes(b)[lane]
-                }
-            });
-        };
-        let pairs = inside.s.iter_mut().zip(&outside.s);
-        pairs.for_each(|(a, b)| select(a, b));
-        let pairs = inside.h.iter_mut().zip(&outside.h);
-        pairs.for_each(|(a, b)| select(a, b));
-        select(&mut inside.c, &outside.c);
-        select(&mut inside.weight, &outside.weight);
-        (inside.count, inside.set) = (0, 0);
-        inside.stale |= outside.stale;
-        above.push(std::mem::replace(&mut node, inside));
+    node
+}
+
+/// Puts the node without a column in the lanes that leave its component out.
+fn leave_lanes<V: Pod>(column: &Top<V>, inside: &mut Node<V>, outside: &Node<V>) {
+    let takes = |lane: usize| column.bit.is_none_or(|bit| lane >> bit & 1 == 1);
+    let select = |a: &mut V, b: &V| {
+        *a = from_lanes(|lane| {
+            if takes(lane) {
+                lanes(a)[lane]
+            } else {
+                lanes(b)[lane]
+            }
+        });
+    };
+    let pairs = inside.s.iter_mut().zip(&outside.s);
+    pairs.for_each(|(a, b)| select(a, b));
+    let pairs = inside.h.iter_mut().zip(&outside.h);
+    pairs.for_each(|(a, b)| select(a, b));
+    select(&mut inside.c, &outside.c);
+    select(&mut inside.weight, &outside.weight);
+    (inside.count, inside.set) = (0, 0);
+    inside.stale |= outside.stale;
+}
+
+/// A sum over the models with a column and over those without it, in the lanes of both.
+fn sides<S: Simd>(simd: S, column: &Top<S::f64s>, x: &S::f64s) -> (S::f64s, S::f64s) {
+    match column.bit {
+        None => (*x, simd.splat_f64s(0.0)),
+        // Each lane meets the one that differs from it in this component only.
+        Some(bit) if column.first => (
+            from_lanes(|lane| lanes(x)[lane | 1 << bit]),
+            from_lanes(|lane| lanes(x)[lane & !(1 << bit)]),
+        ),
+        Some(bit) => {
+            let own =
+                |lane: usize, side: usize| f64::from(lane >> bit & 1 == side) * lanes(x)[lane];
+            (
+                from_lanes(|lane| own(lane, 1)),
+                from_lanes(|lane| own(lane, 0)),
+            )
+        }
     }
-    let (mut sums, tally) = branch(simd, &tree, padded - top.len(), node);
-    for (d, (node, column)) in above.iter().zip(&top).enumerate().rev() {
-        let (inside, outside): (Vec<_>, Vec<_>) = sums
-            .iter()
-            .map(|x| -> (S::f64s, S::f64s) {
-                match column.bit {
-                    None => (*x, simd.splat_f64s(0.0)),
-                    // Each lane meets the one that differs from it in this component only.
-                    Some(bit) if column.first => (
-                        from_lanes(|lane| lanes(x)[lane | 1 << bit]),
-                        from_lanes(|lane| lanes(x)[lane & !(1 << bit)]),
-                    ),
-                    Some(bit) => {
-                        let own = |lane: usize, side: usize| {
-                            f64::from(lane >> bit & 1 == side) * lanes(x)[lane]
-                        };
-                        (
-                            from_lanes(|lane| own(lane, 1)),
-                            from_lanes(|lane| own(lane, 0)),
-                        )
-                    }
-                }
-            })
-            .unzip();
-        sums = join(
-            simd,
-            &tree.levels[padded - d - 1],
-            padded - d,
-            node,
-            &inside,
-            &outside,
-        );
-    }
+}
+
+/// The sums of the first lane, without the columns that only fill the lanes.
+fn of_first_lane<V: Pod>(sums: &[V], padded: usize, size: usize) -> Vec<f64> {
     let (wide, own) = (Layout::new(padded), Layout::new(size));
     let first = |index: usize| lanes(&sums[index])[0];
     let mut out = vec![0.0; own.len()];
@@ -187,7 +203,7 @@ fn root<S: Simd>(simd: S, about: Root<'_>) -> (Vec<f64>, Tally) {
             out[own.moment(j, l)] = first(wide.moment(j, l));
         }
     }
-    (out, tally)
+    out
 }
 
 /// Nodes near the root: their two branches may run on two threads.

@@ -66,6 +66,22 @@ impl Pair {
     }
 }
 
+/// What the ratios of the exchanges of a group's pairs are made of, i leaving and j entering.
+struct Exchanges {
+    /// Ratios a priori, and of the slabs' precisions.
+    prior: Lane,
+    slabs: Lane,
+    /// The tableau's entry of i and j.
+    t: Lane,
+    /// Diagonal and gradient of i: C_i and β_i.
+    inverse: Lane,
+    beta: Lane,
+    /// The same of j, s_j and u_j, and the least that s_j can be.
+    schur: Lane,
+    gradient: Lane,
+    least: Lane,
+}
+
 impl Group {
     /// Proposals when it is its turn: each pair once on average. They cost nothing unless accepted.
     pub(super) fn proposals(&self) -> i32 {
@@ -181,6 +197,55 @@ impl Group {
     fn evaluate<S: Simd>(&mut self, simd: S, walker: &Walker<'_>) {
         let (standard, tableau) = (walker.standard, &walker.tableau);
         let misfit = 1.0 + tableau.excess;
+        (self.sums, self.stays) = ([0.0; LANES], 1.0);
+        let Some(Exchanges {
+            prior,
+            t,
+            slabs,
+            inverse,
+            beta,
+            schur,
+            gradient,
+            least,
+        }) = self.exchanges(walker)
+        else {
+            return;
+        };
+        let (mut change, mut ratio) = ([1.0; LANES], [0.0; LANES]);
+        for lane in 0..LANES {
+            // Without i: s_j grows by t²/C_i, u_j by t β_i/C_i.
+            let c = if inverse[lane] > 1.0 {
+                inverse[lane]
+            } else {
+                1.0
+            };
+            let without = t[lane] / c;
+            let s = schur[lane] + t[lane] * without;
+            let s = if s > least[lane] { s } else { least[lane] };
+            let u = gradient[lane] + without * beta[lane];
+            let swapped = misfit + beta[lane] * beta[lane] / c - u * u / s;
+            let swapped = swapped / misfit;
+            change[lane] = if swapped > f64::MIN_POSITIVE {
+                swapped
+            } else {
+                f64::MIN_POSITIVE
+            };
+            ratio[lane] = prior[lane] * (slabs[lane] / (c * s)).sqrt();
+        }
+        let power = to_the(simd, change, -standard.shape);
+        let mut total = 0.0;
+        for lane in 0..LANES {
+            let r = ratio[lane] * power[lane];
+            total += if r < 1.0 { r } else { 1.0 };
+            self.sums[lane] = total;
+        }
+        self.stays = self.stay().powi(self.proposals());
+    }
+
+    /// What the exchanges of all pairs are made of; turns pairs so that the first is in. `None` where none is in without the other.
+    #[inline(always)]
+    fn exchanges(&mut self, walker: &Walker<'_>) -> Option<Exchanges> {
+        let (standard, tableau) = (walker.standard, &walker.tableau);
         // Of a void proposal the ratio is 0.
         let (mut prior, mut t, mut slabs) = ([0.0; LANES], [0.0; LANES], [1.0; LANES]);
         let (mut inverse, mut beta) = ([1.0; LANES], [0.0; LANES]);
@@ -211,39 +276,16 @@ impl Group {
             least[lane] = standard.precision[j];
             slabs[lane] = pair.slabs[0];
         }
-        (self.sums, self.stays) = ([0.0; LANES], 1.0);
-        if !live {
-            return;
-        }
-        let (mut change, mut ratio) = ([1.0; LANES], [0.0; LANES]);
-        for lane in 0..LANES {
-            // Without i: s_j grows by t²/C_i, u_j by t β_i/C_i.
-            let c = if inverse[lane] > 1.0 {
-                inverse[lane]
-            } else {
-                1.0
-            };
-            let without = t[lane] / c;
-            let s = schur[lane] + t[lane] * without;
-            let s = if s > least[lane] { s } else { least[lane] };
-            let u = gradient[lane] + without * beta[lane];
-            let swapped = misfit + beta[lane] * beta[lane] / c - u * u / s;
-            let swapped = swapped / misfit;
-            change[lane] = if swapped > f64::MIN_POSITIVE {
-                swapped
-            } else {
-                f64::MIN_POSITIVE
-            };
-            ratio[lane] = prior[lane] * (slabs[lane] / (c * s)).sqrt();
-        }
-        let power = to_the(simd, change, -standard.shape);
-        let mut total = 0.0;
-        for lane in 0..LANES {
-            let r = ratio[lane] * power[lane];
-            total += if r < 1.0 { r } else { 1.0 };
-            self.sums[lane] = total;
-        }
-        self.stays = self.stay().powi(self.proposals());
+        live.then_some(Exchanges {
+            prior,
+            t,
+            slabs,
+            inverse,
+            beta,
+            schur,
+            gradient,
+            least,
+        })
     }
 }
 

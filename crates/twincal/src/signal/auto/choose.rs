@@ -107,13 +107,29 @@ pub(crate) fn choose<'a>(
     } else {
         on(joints, logs[0].name(), &candidates, settings)?
     };
+    let logs = ready(joints, logs, candidates, &pipeline);
+    Ok(Chosen {
+        pipeline,
+        wider_hz,
+        findings,
+        logs,
+    })
+}
+
+/// The logs that the pipeline was chosen from, ready for it, in their order.
+fn ready<'a>(
+    joints: &[JointFacts],
+    logs: &[Log<'_>],
+    candidates: Candidates<'a>,
+    pipeline: &Pipeline,
+) -> Vec<ReadyLog<'a>> {
     let Candidates { whole, long } = candidates;
     let (mut whole, mut long) = (whole.into_iter(), long.into_iter());
     let ready = |log: &Log<'_>| match log {
         Log::Whole(_) => whole.next().map(|(recording, pieces, findings)| {
             let joints = joints.to_vec();
             ReadyLog::Whole(PreparedLog::of(
-                joints, recording, pieces, findings, &pipeline,
+                joints, recording, pieces, findings, pipeline,
             ))
         }),
         Log::Long(_) => long.next().map(|(log, chapters)| {
@@ -124,13 +140,7 @@ pub(crate) fn choose<'a>(
             })
         }),
     };
-    let logs = logs.iter().filter_map(ready).collect();
-    Ok(Chosen {
-        pipeline,
-        wider_hz,
-        findings,
-        logs,
-    })
+    logs.iter().filter_map(ready).collect()
 }
 
 fn needs_a_filter(long: &LongLog) -> Error {

@@ -34,43 +34,9 @@ pub(crate) fn velocity_resolution(
     } = *encoder;
     let [velocity_from, derived] = pipeline.sources(joint);
     let has_qd = has_qd && velocity_from == DerivedFrom::Velocity;
-    let (mut velocity, mut acceleration, mut position) = (0.0_f64, 0.0_f64, 0.0_f64);
-    let mut travel = 0.0_f64;
-    for log in spectra {
-        let kernels = MotionKernels::new(pipeline.motion_cutoff_hz, 1.0 / log.position_noise.rate);
-        let derivatives = [&kernels.smooth, &kernels.first, &kernels.second];
-        // Noise that was differenced n times and is differentiated m times more.
-        let after = |noise: Noise, more: i32| {
-            noise.sd() * noise_gain(derivatives[(noise.order + more).clamp(0, 2) as usize])
-        };
-        position = position.max(log.position_noise.sd());
-        travel = travel.max(after(log.position_noise, 1));
-        velocity = velocity.max(match log.velocity_noise {
-            Some(noise) if has_qd => after(noise, 0),
-            _ => after(log.position_noise, 1),
-        });
-        let (noise, more) = log.source(derived);
-        acceleration = acceleration.max(after(noise, more));
-    }
+    let noise = FilteredNoise::of(has_qd, derived, spectra, pipeline);
     if !has_qdd {
-        let source = match derived {
-            DerivedFrom::Velocity => "the logged velocity",
-            DerivedFrom::Position => "position, twice",
-        };
-        findings.push(Finding::new(
-            Severity::Note,
-            Code::DerivedAcceleration,
-            &facts.name,
-            format!(
-                "joint `{}`: acceleration is not logged and was derived from {source}, by the motion filter at {:.3} Hz; position noise of {}, as the spectrum has it, leaves a noise of {} in velocity and {} in acceleration (SI units, per sample)",
-                facts.name, pipeline.motion_cutoff_hz, significant(position, 2), significant(velocity, 2), significant(acceleration, 2)
-            ),
-            0,
-        )
-        .with([
-            ("motion_cutoff", pipeline.motion_cutoff_hz), ("position_noise", position),
-            ("velocity_noise", velocity), ("acceleration_noise", acceleration),
-        ]));
+        findings.push(noise.finding(facts, derived, pipeline));
     }
     let stepping = step.map_or(0.0, |step| 4.0 * pipeline.motion_cutoff_hz * step);
     if let Some(step) = step.filter(|_| stepping > pipeline.coulomb_velocity) {
@@ -91,7 +57,69 @@ pub(crate) fn velocity_resolution(
             ("step_velocity", stepping),
         ]));
     }
-    stepping.max(3.0 * travel)
+    stepping.max(3.0 * noise.of_position)
+}
+
+/// Noise after the motion filter, per sample: the most of all logs.
+#[derive(Default)]
+struct FilteredNoise {
+    position: f64,
+    velocity: f64,
+    acceleration: f64,
+    /// That of velocity derived from position.
+    of_position: f64,
+}
+
+impl FilteredNoise {
+    /// `has_qd`: velocity is logged; `derived`: what acceleration is the derivative of.
+    fn of(
+        has_qd: bool,
+        derived: DerivedFrom,
+        spectra: &[&JointSpectra],
+        pipeline: &Pipeline,
+    ) -> Self {
+        let mut most = Self::default();
+        for log in spectra {
+            let kernels =
+                MotionKernels::new(pipeline.motion_cutoff_hz, 1.0 / log.position_noise.rate);
+            let derivatives = [&kernels.smooth, &kernels.first, &kernels.second];
+            // Noise that was differenced n times and is differentiated m times more.
+            let after = |noise: Noise, more: i32| {
+                noise.sd() * noise_gain(derivatives[(noise.order + more).clamp(0, 2) as usize])
+            };
+            most.position = most.position.max(log.position_noise.sd());
+            most.of_position = most.of_position.max(after(log.position_noise, 1));
+            most.velocity = most.velocity.max(match log.velocity_noise {
+                Some(noise) if has_qd => after(noise, 0),
+                _ => after(log.position_noise, 1),
+            });
+            let (noise, more) = log.source(derived);
+            most.acceleration = most.acceleration.max(after(noise, more));
+        }
+        most
+    }
+
+    /// That acceleration is derived, and what noise is in it.
+    fn finding(&self, facts: &JointFacts, derived: DerivedFrom, pipeline: &Pipeline) -> Finding {
+        let source = match derived {
+            DerivedFrom::Velocity => "the logged velocity",
+            DerivedFrom::Position => "position, twice",
+        };
+        Finding::new(
+            Severity::Note,
+            Code::DerivedAcceleration,
+            &facts.name,
+            format!(
+                "joint `{}`: acceleration is not logged and was derived from {source}, by the motion filter at {:.3} Hz; position noise of {}, as the spectrum has it, leaves a noise of {} in velocity and {} in acceleration (SI units, per sample)",
+                facts.name, pipeline.motion_cutoff_hz, significant(self.position, 2), significant(self.velocity, 2), significant(self.acceleration, 2)
+            ),
+            0,
+        )
+        .with([
+            ("motion_cutoff", pipeline.motion_cutoff_hz), ("position_noise", self.position),
+            ("velocity_noise", self.velocity), ("acceleration_noise", self.acceleration),
+        ])
+    }
 }
 
 /// Noise that an encoder of this step leaves in velocity and acceleration after the motion filter: uniform rounding has

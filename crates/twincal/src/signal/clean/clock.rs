@@ -157,36 +157,63 @@ fn finite_rows(
         }
         cut = !finite;
     }
-    let lost = samples - kept.len();
+    let missing = MissingSamples {
+        log,
+        channels,
+        per_channel,
+        lost: samples - kept.len(),
+    };
     if let Some(every) = slower_channels(&kept, samples) {
-        let names: Vec<&str> = channels
-            .iter()
-            .zip(&per_channel)
-            .filter(|(_, count)| **count * 10 > samples)
+        findings.push(missing.of_slower_channels(every, kept.len()));
+        cut_before.fill(false);
+    } else if missing.lost > 0 {
+        findings.push(missing.not_finite());
+    }
+    (kept, cut_before)
+}
+
+/// Where a log lacks samples.
+struct MissingSamples<'a> {
+    log: &'a Recording,
+    channels: &'a [(String, &'a [f64])],
+    /// Rows in which a channel has no sample, channel by channel.
+    per_channel: Vec<usize>,
+    /// Rows in which some channel has no sample.
+    lost: usize,
+}
+
+impl MissingSamples<'_> {
+    /// The first four channels that lack more than so many tenths of their samples, and how many they lack.
+    fn lacking(&self, tenths: usize) -> impl Iterator<Item = (&str, usize)> {
+        let samples = self.log.time.len();
+        (self.channels.iter().zip(&self.per_channel))
+            .filter(move |(_, count)| **count * 10 > tenths * samples)
             .take(4)
-            .map(|((name, _), _)| name.as_str())
-            .collect();
+            .map(|((name, _), count)| (name.as_str(), *count))
+    }
+
+    /// Channels that have a value only in every so many rows, of which `kept` hold all channels.
+    fn of_slower_channels(&self, every: usize, kept: usize) -> Finding {
+        let names: Vec<&str> = self.lacking(1).map(|(name, _)| name).collect();
         let ending = ["th", "st", "nd", "rd"][if every < 4 { every } else { 0 }];
-        findings.push(Finding::new(
+        Finding::new(
             Severity::Warning,
             Code::SlowerChannels,
-            &log.name,
+            &self.log.name,
             format!(
-                "{} have a value only in every {every}{ending} row: the log is read at that rate, from the {} rows that hold all channels; they share one clock, so no skew can be estimated",
+                "{} have a value only in every {every}{ending} row: the log is read at that rate, from the {kept} rows that hold all channels; they share one clock, so no skew can be estimated",
                 names.join(", "),
-                kept.len()
             ),
-            lost as u64,
+            self.lost as u64,
         )
-        .with([("every", every as f64), ("rows", kept.len() as f64)]));
-        cut_before.fill(false);
-    } else if lost > 0 {
-        let worst: Vec<String> = channels
-            .iter()
-            .zip(&per_channel)
-            .filter(|(_, count)| **count > 0)
-            .take(4)
-            .map(|((name, _), count)| format!("{name}: {count}"))
+        .with([("every", every as f64), ("rows", kept as f64)])
+    }
+
+    /// Rows with values that are no samples.
+    fn not_finite(&self) -> Finding {
+        let (samples, lost) = (self.log.time.len(), self.lost);
+        let worst: Vec<String> = (self.lacking(0))
+            .map(|(name, count)| format!("{name}: {count}"))
             .collect();
         let share = lost as f64 / samples as f64;
         let severity = if share > NOT_FINITE_LIMIT {
@@ -194,10 +221,10 @@ fn finite_rows(
         } else {
             Severity::Warning
         };
-        findings.push(Finding::new(
+        Finding::new(
             severity,
             Code::NotFiniteRows,
-            &log.name,
+            &self.log.name,
             format!(
                 "{lost} of {samples} rows ({:.2} %) have values that are NaN, infinite or beyond {LARGEST:e} ({}) and were dropped; the log is cut there",
                 100.0 * share,
@@ -205,9 +232,8 @@ fn finite_rows(
             ),
             lost as u64,
         )
-        .with([("rows", samples as f64), ("share", share), ("limit", LARGEST)]));
+        .with([("rows", samples as f64), ("share", share), ("limit", LARGEST)])
     }
-    (kept, cut_before)
 }
 
 /// k if nearly all complete rows are k ≥ 2 rows apart: the table joins topics of different rates.
@@ -248,32 +274,11 @@ fn median_interval(
     if (1e-5..0.5).contains(&interval) {
         return Ok(interval);
     }
-    let guess = [
-        (WrongUnit::Milliseconds, "milliseconds", "ms", 1e-3),
-        (WrongUnit::Microseconds, "microseconds", "us", 1e-6),
-        (WrongUnit::Nanoseconds, "nanoseconds", "ns", 1e-9),
-    ]
-    .into_iter()
-    .find(|(.., size)| (10.0..=1e5).contains(&(1.0 / (interval * size))));
-    let (problem, remedy) = match &guess {
-        Some((_, unit, short, size)) => (
-            format!(
-                "the median time step is {interval} s; the stamps look like {unit} ({} Hz)",
-                (1e3 / (interval * size)).round() / 1e3
-            ),
-            format!(
-                "say [columns] time_unit = \"{short}\", divide by {:.0} where the log is made, or give the right --rate HZ",
-                1.0 / size
-            ),
-        ),
-        None => (
-            format!(
-                "the median time step of {interval} s is implausible for a robot log (0.01 ms to 0.5 s)"
-            ),
-            "give time in seconds, or the sampling rate with --rate HZ".to_owned(),
-        ),
-    };
+    let step = ImplausibleStep::of(interval);
     if every_row {
+        let ImplausibleStep {
+            problem, remedy, ..
+        } = &step;
         findings.push(
             Finding::new(
                 Severity::Warning,
@@ -283,19 +288,60 @@ fn median_interval(
                 0,
             )
             .with([("interval", interval)])
-            .with(guess.map(|(.., size)| ("rate", 1.0 / (interval * size)))),
+            .with(step.unit.map(|(_, rate)| ("rate", rate))),
         );
         return Ok(interval);
     }
-    Err(match guess {
-        Some((unit, ..)) => Error::Unit {
+    Err(match step.unit {
+        Some((unit, _)) => Error::Unit {
             log: log.name.clone(),
             unit,
-            problem,
-            remedy,
+            problem: step.problem,
+            remedy: step.remedy,
         },
-        None => log_error(log, problem, remedy),
+        None => log_error(log, step.problem, step.remedy),
     })
+}
+
+/// A median step that no log of a robot has.
+struct ImplausibleStep {
+    problem: String,
+    remedy: String,
+    /// The unit that the stamps look like, and the rate that they have then, Hz.
+    unit: Option<(WrongUnit, f64)>,
+}
+
+impl ImplausibleStep {
+    fn of(interval: f64) -> Self {
+        let rate = |size: f64| 1.0 / (interval * size);
+        let guess = [
+            (WrongUnit::Milliseconds, "milliseconds", "ms", 1e-3),
+            (WrongUnit::Microseconds, "microseconds", "us", 1e-6),
+            (WrongUnit::Nanoseconds, "nanoseconds", "ns", 1e-9),
+        ]
+        .into_iter()
+        .find(|(.., size)| (10.0..=1e5).contains(&rate(*size)));
+        match guess {
+            Some((wrong, unit, short, size)) => Self {
+                problem: format!(
+                    "the median time step is {interval} s; the stamps look like {unit} ({} Hz)",
+                    (1e3 / (interval * size)).round() / 1e3
+                ),
+                remedy: format!(
+                    "say [columns] time_unit = \"{short}\", divide by {:.0} where the log is made, or give the right --rate HZ",
+                    1.0 / size
+                ),
+                unit: Some((wrong, rate(size))),
+            },
+            None => Self {
+                problem: format!(
+                    "the median time step of {interval} s is implausible for a robot log (0.01 ms to 0.5 s)"
+                ),
+                remedy: "give time in seconds, or the sampling rate with --rate HZ".to_owned(),
+                unit: None,
+            },
+        }
+    }
 }
 
 /// Cuts the kept rows into runs.
@@ -308,8 +354,7 @@ fn cut(
 ) -> Vec<Run> {
     let (interval, every_row) = (rows.interval, rows.every_row);
     let time = sampled.time.as_ref().unwrap_or(&log.time);
-    let (mut same, mut contradicting, mut crowded) = (0_u64, 0_u64, 0_u64);
-    let (mut back, mut gaps, mut longest) = (0_u64, 0_u64, 0.0_f64);
+    let mut stamps = IrregularStamps::default();
     let mut runs = Vec::new();
     let mut run = Run::default();
     let mut cut = false;
@@ -329,21 +374,21 @@ fn cut(
                 .iter()
                 .all(|(_, values)| values[row] == values[last])
             {
-                same += 1;
+                stamps.same += 1;
             } else {
-                contradicting += 1;
+                stamps.contradicting += 1;
             }
             continue;
         }
         if step > 0.0 && step < CROWDED * interval && !every_row {
-            crowded += 1;
+            stamps.crowded += 1;
             continue;
         }
-        back += u64::from(step < 0.0);
+        stamps.back += u64::from(step < 0.0);
         let gap = step > GAP * interval;
         if gap && !cut {
-            gaps += 1;
-            longest = longest.max(step);
+            stamps.gaps += 1;
+            stamps.longest = stamps.longest.max(step);
         }
         if step < 0.0 || gap || cut {
             runs.push(std::mem::take(&mut run));
@@ -352,11 +397,46 @@ fn cut(
     }
     runs.push(run);
     runs.retain(|run| !run.rows.is_empty());
+    report_stamps(log, &stamps, interval, findings);
+    runs
+}
 
+/// What [`cut`] counts of the steps from one kept row to the next.
+#[derive(Default)]
+struct IrregularStamps {
+    /// Rows that repeat the stamp and all values of the row before.
+    same: u64,
+    /// Rows that repeat the stamp with other values.
+    contradicting: u64,
+    /// Rows that follow by less than [`CROWDED`] intervals.
+    crowded: u64,
+    /// Steps back in time.
+    back: u64,
+    /// Steps longer than [`GAP`] intervals.
+    gaps: u64,
+    /// The longest gap, s.
+    longest: f64,
+}
+
+/// Says which rows were dropped for their stamps, and where the log is cut.
+fn report_stamps(
+    log: &Recording,
+    stamps: &IrregularStamps,
+    interval: f64,
+    findings: &mut Vec<Finding>,
+) {
     let mut say = |severity, code: Code, message: String, count, numbers: &[_]| {
         let finding = Finding::new(severity, code, &log.name, message, count);
         findings.push(finding.with(numbers.iter().copied()));
     };
+    let &IrregularStamps {
+        same,
+        contradicting,
+        crowded,
+        back,
+        gaps,
+        longest,
+    } = stamps;
     if same > 0 {
         let text = format!(
             "{same} rows repeat the stamp and all values of the row before and were dropped"
@@ -397,7 +477,6 @@ fn cut(
         let numbers = [("steps", GAP), ("interval", interval), ("longest", longest)];
         say(Severity::Note, Code::Gaps, text, gaps, &numbers);
     }
-    runs
 }
 
 /// "12", "0.35", "0.0021": two digits, however small.

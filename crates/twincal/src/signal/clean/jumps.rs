@@ -119,61 +119,21 @@ pub(crate) fn cut_jumps(
     every_row: bool,
     findings: &mut Vec<Finding>,
 ) -> Vec<Run> {
+    let of_log = LogMotion {
+        joints,
+        log,
+        clock,
+        every_row,
+    };
     let times: Vec<Vec<f64>> = clock
         .runs
         .iter()
         .map(|run| run.rows.iter().map(|&row| clock.stamp(log, row)).collect())
         .collect();
-    let channels: Vec<(usize, &'static str, &'static str, &[f64])> = (0..joints.len())
-        .flat_map(|joint| {
-            let position = clock.sampled.position(log, joint);
-            let [qd, qdd] = clock.sampled.derivatives(log, joint);
-            [
-                (
-                    "position",
-                    "",
-                    unfolded[joint].as_deref().or(Some(position)),
-                ),
-                ("velocity", "/s", qd),
-                ("acceleration", "/s²", qdd),
-            ]
-            .into_iter()
-            .filter_map(move |(channel, per, values)| Some((joint, channel, per, values?)))
-        })
-        .collect();
-    let all: Vec<Found> = channels
+    let all: Vec<Found> = of_log
+        .channels(unfolded)
         .into_par_iter()
-        .map(|(joint, channel, per, values)| {
-            let mut in_log = Jumps::default();
-            for (run, time) in clock.runs.iter().zip(&times) {
-                let own: Vec<f64> = run.rows.iter().map(|&row| values[row]).collect();
-                let mut in_run = jumps(time, &own, clock.interval);
-                if let (false, [Some(logged), _]) =
-                    (every_row, clock.sampled.derivatives(log, joint))
-                {
-                    let velocity: Vec<f64> = run.rows.iter().map(|&row| logged[row]).collect();
-                    in_run
-                        .steps
-                        .retain(|step| !explains(time, &velocity, *step));
-                }
-                let row = |(i, size): (usize, f64)| (run.rows[i], size);
-                in_log.spikes.extend(in_run.spikes.into_iter().map(row));
-                // Velocity steps where something is hit; a folded angle by a full turn, which is told elsewhere.
-                let turns = joints[joint].kind != JointKind::Prismatic;
-                let folded = |size: f64| turns && (size.abs() / TAU - 1.0).abs() < FOLDED;
-                let of_position = in_run
-                    .steps
-                    .into_iter()
-                    .filter(|(_, size)| channel == "position" && !(every_row && folded(*size)));
-                in_log.steps.extend(of_position.map(row));
-            }
-            Found {
-                joint,
-                channel,
-                per,
-                jumps: in_log,
-            }
-        })
+        .map(|channel| of_log.found(&times, channel))
         .collect();
     all.iter()
         .for_each(|found| findings.extend(tell(joints, log, found, every_row)));
@@ -201,6 +161,86 @@ pub(crate) fn cut_jumps(
     }
     runs.retain(|run| !run.rows.is_empty());
     runs
+}
+
+/// One channel of a joint's motion.
+struct Channel<'a> {
+    joint: usize,
+    name: &'static str,
+    /// After "rad" or "m".
+    per: &'static str,
+    /// Row by row of the recording.
+    values: &'a [f64],
+}
+
+/// The motion in a log whose clock is read.
+struct LogMotion<'a> {
+    joints: &'a [JointFacts],
+    log: &'a Recording,
+    clock: &'a Clock,
+    every_row: bool,
+}
+
+impl LogMotion<'_> {
+    /// The channels of motion that the log has, joint by joint.
+    fn channels<'a>(&'a self, unfolded: &'a [Option<Vec<f64>>]) -> Vec<Channel<'a>> {
+        (0..self.joints.len())
+            .flat_map(|joint| {
+                let position = self.clock.sampled.position(self.log, joint);
+                let [qd, qdd] = self.clock.sampled.derivatives(self.log, joint);
+                let position = unfolded[joint].as_deref().or(Some(position));
+                [
+                    ("position", "", position),
+                    ("velocity", "/s", qd),
+                    ("acceleration", "/s²", qdd),
+                ]
+                .into_iter()
+                .filter_map(move |(name, per, values)| {
+                    let values = values?;
+                    Some(Channel {
+                        joint,
+                        name,
+                        per,
+                        values,
+                    })
+                })
+            })
+            .collect()
+    }
+
+    /// The jumps of one channel; `times` are the stamps of the clock's runs.
+    fn found(&self, times: &[Vec<f64>], channel: Channel<'_>) -> Found {
+        let (joint, every_row) = (channel.joint, self.every_row);
+        let mut in_log = Jumps::default();
+        for (run, time) in self.clock.runs.iter().zip(times) {
+            let own: Vec<f64> = run.rows.iter().map(|&row| channel.values[row]).collect();
+            let mut in_run = jumps(time, &own, self.clock.interval);
+            if let (false, [Some(logged), _]) =
+                (every_row, self.clock.sampled.derivatives(self.log, joint))
+            {
+                let velocity: Vec<f64> = run.rows.iter().map(|&row| logged[row]).collect();
+                in_run
+                    .steps
+                    .retain(|step| !explains(time, &velocity, *step));
+            }
+            let row = |(i, size): (usize, f64)| (run.rows[i], size);
+            in_log.spikes.extend(in_run.spikes.into_iter().map(row));
+            // Velocity steps where something is hit; a folded angle by a full turn, which is told elsewhere.
+            let turns = self.joints[joint].kind != JointKind::Prismatic;
+            let folded = |size: f64| turns && (size.abs() / TAU - 1.0).abs() < FOLDED;
+            let of_position = in_run
+                .steps
+                .into_iter()
+                .filter(|(_, size)| channel.name == "position" && !(every_row && folded(*size)));
+            in_log.steps.extend(of_position.map(row));
+        }
+        Found {
+            joint,
+            channel: channel.name,
+            per: channel.per,
+            jumps: in_log,
+        }
+    }
 }
 
 /// A warning for the spikes and one for the steps of a channel.

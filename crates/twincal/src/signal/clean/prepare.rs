@@ -28,17 +28,7 @@ pub(crate) fn prepare<'a>(
     corrections: &Corrections,
     findings: &mut Vec<Finding>,
 ) -> Result<Prepared<'a>> {
-    if log.joints.len() != joints.len() {
-        return Err(Error::Log {
-            log: log.name.clone(),
-            problem: format!(
-                "{} joints, the model has {} moving ones",
-                log.joints.len(),
-                joints.len()
-            ),
-            remedy: "give one set of channels per moving joint of the model".into(),
-        });
-    }
+    refuse_joints(joints, log)?;
     let names: Vec<String> = joints.iter().map(|j| j.name.clone()).collect();
     let minimum = if every_row { 2 } else { MINIMUM_SAMPLES };
     let clock = read_clock(log, &names, minimum, every_row, findings)?;
@@ -46,40 +36,25 @@ pub(crate) fn prepare<'a>(
     let unfolded = unfold(joints, log, &clock, every_row, findings);
     let runs = cut_jumps(joints, log, &unfolded, &clock, every_row, findings);
     let values = |joint: usize, run: &Run| {
-        let mut values = logged(log, &clock, joint, run);
-        if let Some(q) = &unfolded[joint] {
-            values.q = run.rows.iter().map(|&row| q[row]).collect();
-        }
+        let mut values = logged(log, &clock, &unfolded, (joint, run));
         values.qd = (values.qd).filter(|_| corrections.velocity != Some(DerivedFrom::Position));
         values
     };
     let mut pieces = Vec::with_capacity(runs.len());
-    let (mut short, mut short_rows, mut resampled) = (0_u64, 0_u64, 0_u64);
+    // Rows of every run that is too short.
+    let (mut short, mut resampled) = (Vec::new(), 0_u64);
     // Without torque nothing has to move, and the grid keeps its ends.
     let moves = corrections.moves(joints) && log.joints.iter().any(|c| c.tau.is_some());
     for run in &runs {
         if run.rows.len() < MINIMUM_RUN && !every_row {
-            short += 1;
-            short_rows += run.rows.len() as u64;
+            short.push(run.rows.len() as u64);
             continue;
         }
         let stamps: Vec<f64> = run.rows.iter().map(|&row| clock.stamp(log, row)).collect();
         let values: Vec<Values<'a>> = (0..joints.len()).map(|joint| values(joint, run)).collect();
-        let even = if every_row {
-            Some(clock.interval)
-        } else {
-            even_interval(&stamps)
-        };
         let logged = moves.then(|| (stamps.clone(), values.clone()));
-        let mut piece = match even {
-            Some(interval) => Piece {
-                time: stamps,
-                interval,
-                every: 1,
-                rows: run.rows.clone(),
-                grid_rows: run.rows.clone(),
-                joints: values,
-            },
+        let mut piece = match step_of(&stamps, &clock, every_row) {
+            Some(interval) => on_stamps(stamps, run, values, interval),
             None => {
                 resampled += stamps.len() as u64;
                 on_grid(&stamps, run, &values, clock.interval)
@@ -90,15 +65,14 @@ pub(crate) fn prepare<'a>(
             let kept = corrections.move_torque(joints, &stamps, &values, time, moved);
             piece.keep(kept);
             if piece.time.len() < MINIMUM_RUN {
-                short += 1;
-                short_rows += piece.rows.len() as u64;
+                short.push(piece.rows.len() as u64);
                 continue;
             }
         }
         pieces.push(piece);
     }
     report_jitter(log, &runs, &clock, resampled, findings);
-    report_short(log, short, short_rows, findings);
+    report_short(log, short.len() as u64, short.iter().sum(), findings);
     Ok(Prepared {
         pieces,
         interval: clock.interval,
@@ -106,26 +80,51 @@ pub(crate) fn prepare<'a>(
     })
 }
 
-/// Channels of a joint in a run, single values interpolated where they repeat.
-fn logged<'a>(log: &'a Recording, clock: &Clock, joint: usize, run: &Run) -> Values<'a> {
+/// An error where a log has another number of joints than the model.
+fn refuse_joints(joints: &[JointFacts], log: &Recording) -> Result<()> {
+    if log.joints.len() == joints.len() {
+        return Ok(());
+    }
+    Err(Error::Log {
+        log: log.name.clone(),
+        problem: format!(
+            "{} joints, the model has {} moving ones",
+            log.joints.len(),
+            joints.len()
+        ),
+        remedy: "give one set of channels per moving joint of the model".into(),
+    })
+}
+
+/// Channels of a joint in a run, unfolded, single values interpolated where they repeat.
+fn logged<'a>(
+    log: &'a Recording,
+    clock: &Clock,
+    unfolded: &[Option<Vec<f64>>],
+    (joint, run): (usize, &Run),
+) -> Values<'a> {
     let own = &log.joints[joint];
     let channel = |values: &'a Option<Vec<f64>>| Some(pick(values.as_deref()?, &run.rows));
     let tau = channel(&own.tau);
-    let Some(filled) = clock.sampled.filled.get(joint).and_then(Option::as_ref) else {
-        return Values {
+    let of_run = |values: &[f64]| run.rows.iter().map(|&row| values[row]).collect();
+    let mut values = match clock.sampled.filled.get(joint).and_then(Option::as_ref) {
+        None => Values {
             q: pick(&own.q, &run.rows),
             qd: channel(&own.qd),
             qdd: channel(&own.qdd),
             tau,
-        };
+        },
+        Some(filled) => Values {
+            q: of_run(&filled.q),
+            qd: filled.qd.as_deref().map(of_run),
+            qdd: filled.qdd.as_deref().map(of_run),
+            tau,
+        },
     };
-    let of_run = |values: &[f64]| run.rows.iter().map(|&row| values[row]).collect();
-    Values {
-        q: of_run(&filled.q),
-        qd: filled.qd.as_deref().map(of_run),
-        qdd: filled.qdd.as_deref().map(of_run),
-        tau,
+    if let Some(q) = &unfolded[joint] {
+        values.q = of_run(q);
     }
+    values
 }
 
 /// Says how many runs were too short to use.
@@ -142,6 +141,26 @@ pub(crate) fn report_short(log: &Recording, short: u64, rows: u64, findings: &mu
             rows,
         )
         .with([("segments", short as f64)]));
+    }
+}
+
+/// Step of a run that keeps its stamps; `None` where they are uneven.
+fn step_of(stamps: &[f64], clock: &Clock, every_row: bool) -> Option<f64> {
+    match every_row {
+        true => Some(clock.interval),
+        false => even_interval(stamps),
+    }
+}
+
+/// A run with its stamps as they are.
+fn on_stamps<'a>(time: Vec<f64>, run: &Run, joints: Vec<Values<'a>>, interval: f64) -> Piece<'a> {
+    Piece {
+        time,
+        interval,
+        every: 1,
+        rows: run.rows.clone(),
+        grid_rows: run.rows.clone(),
+        joints,
     }
 }
 

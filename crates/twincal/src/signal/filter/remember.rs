@@ -28,27 +28,7 @@ impl Pipeline {
         if self.history.len() != trajectory.dof {
             return;
         }
-        let temperatures: Vec<Option<Vec<(f64, f64)>>> = (self.history.iter().zip(&log.joints))
-            .map(|(joint, channels)| match joint.warmth {
-                Some(Warmth::Temperature { .. }) => {
-                    known_temperatures(&log.time, &channels.temperature)
-                }
-                _ => None,
-            })
-            .collect();
-        let asks = |joint: &JointHistory| matches!(joint.warmth, Some(Warmth::Temperature { .. }));
-        let cold = self.history.iter().zip(&temperatures);
-        let cold = cold.filter(|(joint, known)| asks(joint) && known.is_none());
-        let cold = cold.count() as u64;
-        if cold > 0 {
-            findings.push(Finding::new(
-                Severity::Warning,
-                Code::TemperatureMissing,
-                &log.name,
-                format!("the log has no temperature of {cold} joints whose friction changes with it: the training logs' mean is taken"),
-                cold,
-            ));
-        }
+        let temperatures = self.temperatures(log, findings);
         for segment in &mut trajectory.segments {
             let len = segment.time.len();
             segment.history = vec![0.0; trajectory.dof * CHANNELS * len];
@@ -85,6 +65,36 @@ impl Pipeline {
                 }
             });
         }
+    }
+
+    /// What the log says of each joint's temperature, as stamps and values; a warning where a joint's friction needs it and it is missing.
+    fn temperatures(
+        &self,
+        log: &Recording,
+        findings: &mut Vec<Finding>,
+    ) -> Vec<Option<Vec<(f64, f64)>>> {
+        let temperatures: Vec<_> = (self.history.iter().zip(&log.joints))
+            .map(|(joint, channels)| match joint.warmth {
+                Some(Warmth::Temperature { .. }) => {
+                    known_temperatures(&log.time, &channels.temperature)
+                }
+                _ => None,
+            })
+            .collect();
+        let asks = |joint: &JointHistory| matches!(joint.warmth, Some(Warmth::Temperature { .. }));
+        let cold = self.history.iter().zip(&temperatures);
+        let cold = cold.filter(|(joint, known)| asks(joint) && known.is_none());
+        let cold = cold.count() as u64;
+        if cold > 0 {
+            findings.push(Finding::new(
+                Severity::Warning,
+                Code::TemperatureMissing,
+                &log.name,
+                format!("the log has no temperature of {cold} joints whose friction changes with it: the training logs' mean is taken"),
+                cold,
+            ));
+        }
+        temperatures
     }
 
     /// Channels of a joint's stop operators; masks the samples before all of them are known.

@@ -95,11 +95,8 @@ pub(super) fn smoothed(
             // As logged: a filtered position rings where a move ends.
             let rest = at_rest(&channels.q, ready.at_rest[joint], piece.interval);
             still.copy_from_slice(&rest[half..half + len]);
-            let limit = pipeline.standstill_velocity[joint];
             let travel = travel.as_deref().unwrap_or(qd);
-            let seconds = pipeline.shortest_standstill();
-            let slow = slower_than(travel, limit, seconds, piece.interval);
-            (still.iter_mut().zip(slow)).for_each(|(still, slow)| *still |= slow);
+            add_slow(travel, (pipeline, joint), piece.interval, still);
         });
     let torque = piece.joints.iter().filter_map(|c| c.tau.as_ref());
     let tau = torque
@@ -127,6 +124,19 @@ pub(super) fn smoothed(
         interval: piece.interval,
         logged_interval: piece.interval / piece.every as f64,
     })
+}
+
+/// Adds samples at which a joint travels so slowly that it stands still.
+fn add_slow(
+    travel: &[f64],
+    (pipeline, joint): (&Pipeline, usize),
+    interval: f64,
+    still: &mut [bool],
+) {
+    let limit = pipeline.standstill_velocity[joint];
+    let seconds = pipeline.shortest_standstill();
+    let slow = slower_than(travel, limit, seconds, interval);
+    (still.iter_mut().zip(slow)).for_each(|(still, slow)| *still |= slow);
 }
 
 /// Smooth position, velocity and acceleration of one joint; the derivative of its position, where that is not the velocity.

@@ -6,6 +6,19 @@ use std::f64::consts::PI;
 /// Pieces that a spectrum is averaged over at most, evenly spread: its relative sd is 18 % per bin, 1 % in a floor's median.
 const MOST_PIECES: usize = 32;
 
+/// Pieces of `steps` steps that overlap by half, evenly spread ones of many.
+fn pieces<'a>(runs: impl Iterator<Item = &'a [f64]>, steps: usize) -> Vec<&'a [f64]> {
+    let all: Vec<&[f64]> = runs
+        .flat_map(|run| {
+            let starts = (0..run.len()).step_by((steps / 2).max(1));
+            starts
+                .take_while(|start| start + steps < run.len())
+                .map(|start| &run[start..=start + steps])
+        })
+        .collect();
+    spread(&all)
+}
+
 /// Evenly spread ones of many pieces.
 fn spread<'a>(pieces: &[&'a [f64]]) -> Vec<&'a [f64]> {
     let kept = pieces.len().min(MOST_PIECES);
@@ -81,15 +94,7 @@ impl Spectrum {
         let energy: f64 = window.iter().map(|w| w * w).sum();
         let mut density = vec![0.0; size / 2];
         // Two pieces at a time, one as real and one as imaginary part.
-        let starts: Vec<&[f64]> = runs
-            .flat_map(|run| {
-                let starts = (0..run.len()).step_by((piece / 2).max(1));
-                starts
-                    .take_while(|start| start + piece < run.len())
-                    .map(|start| &run[start..=start + piece])
-            })
-            .collect();
-        let starts = spread(&starts);
+        let starts = pieces(runs, piece);
         let pieces = starts.len() as f64;
         let fourier = Fourier::new(size);
         let (mut re, mut im) = (vec![0.0; size], vec![0.0; size]);

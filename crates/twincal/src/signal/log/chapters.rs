@@ -39,7 +39,7 @@ impl LongLog {
         mut visit: impl FnMut(usize, &Place<'_>, &mut Vec<Finding>) -> Result<()> + Send,
     ) -> Result<()> {
         let chapters = self.chapters();
-        let (mut said, mut unused, mut rows) = (Vec::new(), Vec::new(), 0);
+        let (mut said, mut unused) = (Vec::new(), Vec::new());
         let read = |chapter: usize| {
             (chapter < chapters)
                 .then(|| self.chapter(chapter))
@@ -71,7 +71,6 @@ impl LongLog {
             match visited {
                 Ok(()) => said.extend(of_chapter.into_iter().map(|finding| (number, finding))),
                 Err(unusable @ (Error::Log { .. } | Error::Unit { .. })) => {
-                    rows += self.samples[number] as u64;
                     unused.push((number, unusable));
                 }
                 Err(other) => return Err(other),
@@ -85,35 +84,45 @@ impl LongLog {
         }
         findings.extend(self.folding.findings(&self.name));
         findings.extend(told_once(said, chapters));
-        let count = unused.len();
-        if let Some((chapter, first)) = unused.into_iter().next() {
-            if count == chapters {
-                return Err(first);
-            }
-            let all: usize = self.samples.iter().sum();
-            let severity = if rows as f64 > LEFT_OUT_LIMIT * all as f64 {
-                Severity::Degraded
-            } else {
-                Severity::Warning
-            };
-            findings.push(Finding::new(
-                severity,
-                Code::ChaptersLeftOut,
-                &self.name,
-                format!(
-                    "{count} of {chapters} chapters cannot be used and were left out; the first is number {}: {}",
-                    chapter + 1,
-                    first.without_log()
-                ),
-                rows,
-            )
-            .with([
-                ("chapters_left_out", count as f64),
-                ("chapters", chapters as f64),
-                ("first_chapter", (chapter + 1) as f64),
-            ]));
-        }
+        findings.extend(self.left_out(unused)?);
         Ok(())
+    }
+
+    /// That these chapters cannot be used; the first one's error where they are all.
+    fn left_out(&self, unused: Vec<(usize, Error)>) -> Result<Option<Finding>> {
+        let (chapters, count) = (self.chapters(), unused.len());
+        let rows: u64 = (unused.iter())
+            .map(|(chapter, _)| self.samples[*chapter] as u64)
+            .sum();
+        let Some((chapter, first)) = unused.into_iter().next() else {
+            return Ok(None);
+        };
+        if count == chapters {
+            return Err(first);
+        }
+        let all: usize = self.samples.iter().sum();
+        let severity = if rows as f64 > LEFT_OUT_LIMIT * all as f64 {
+            Severity::Degraded
+        } else {
+            Severity::Warning
+        };
+        let finding = Finding::new(
+            severity,
+            Code::ChaptersLeftOut,
+            &self.name,
+            format!(
+                "{count} of {chapters} chapters cannot be used and were left out; the first is number {}: {}",
+                chapter + 1,
+                first.without_log()
+            ),
+            rows,
+        )
+        .with([
+            ("chapters_left_out", count as f64),
+            ("chapters", chapters as f64),
+            ("first_chapter", (chapter + 1) as f64),
+        ]);
+        Ok(Some(finding))
     }
 
     /// That it is long, as a note; `cut`: filters end where chapters do.

@@ -339,7 +339,18 @@ impl Parser<'_> {
         if name == "pi" {
             return Ok(self.graph.constant(std::f64::consts::PI));
         }
-        let n = self.joints.len();
+        match self.coordinate(start, &name)? {
+            Some(variable) => Ok(self.graph.variable(variable)),
+            None => Err(self.error(
+                start,
+                format!("`{name}` is unknown"),
+                self.suggestion(&name),
+            )),
+        }
+    }
+
+    /// The coordinate of a name such as `q2` or `qd2`, which starts at `start`; `None` for any other name.
+    fn coordinate(&self, start: usize, name: &str) -> Result<Option<Variable>> {
         let index = |prefix: &str| {
             let digits = name.strip_prefix(prefix)?;
             (!digits.is_empty() && digits.bytes().all(|b| b.is_ascii_digit())).then_some(digits)
@@ -352,42 +363,41 @@ impl Parser<'_> {
                 remedy,
             ));
         }
-        for (prefix, velocity) in [("qd", true), ("q", false)] {
+        for prefix in ["qd", "q"] {
             let Some(digits) = index(prefix) else {
                 continue;
             };
+            let n = self.joints.len();
             let joint = digits
                 .parse::<usize>()
                 .ok()
                 .filter(|i| (1..=n).contains(i) && !digits.starts_with('0'));
-            let Some(joint) = joint else {
-                let range = if n == 1 {
-                    format!("{prefix}1")
-                } else {
-                    format!("{prefix}1 to {prefix}{n}")
-                };
-                let problem = format!(
-                    "there is no `{name}`: the robot has {n} moving joint{}",
-                    if n == 1 { "" } else { "s" }
-                );
-                return Err(self.error(
-                    start,
-                    problem,
-                    format!("use {range} ({})", self.listed_joints()),
-                ));
+            return match joint {
+                None => Err(self.no_joint(start, name, prefix)),
+                Some(joint) if prefix == "qd" => Ok(Some(Variable::Velocity(joint - 1))),
+                Some(joint) => Ok(Some(Variable::Position(joint - 1))),
             };
-            let variable = if velocity {
-                Variable::Velocity(joint - 1)
-            } else {
-                Variable::Position(joint - 1)
-            };
-            return Ok(self.graph.variable(variable));
         }
-        Err(self.error(
+        Ok(None)
+    }
+
+    /// The error for a coordinate of a joint that is not there.
+    fn no_joint(&self, start: usize, name: &str, prefix: &str) -> Error {
+        let n = self.joints.len();
+        let range = if n == 1 {
+            format!("{prefix}1")
+        } else {
+            format!("{prefix}1 to {prefix}{n}")
+        };
+        let problem = format!(
+            "there is no `{name}`: the robot has {n} moving joint{}",
+            if n == 1 { "" } else { "s" }
+        );
+        self.error(
             start,
-            format!("`{name}` is unknown"),
-            self.suggestion(&name),
-        ))
+            problem,
+            format!("use {range} ({})", self.listed_joints()),
+        )
     }
 
     /// "q1 = shoulder, q2 = elbow", cut after eight.

@@ -43,6 +43,17 @@ impl Chunk {
     }
 }
 
+/// What the ratios of eight flips are made of.
+struct Flips {
+    /// What the evidence is divided by, squared.
+    d: Lane,
+    /// What the misfit changes by, times `over`.
+    square: Lane,
+    over: Lane,
+    /// +1 where a component is in, −1 where it is out.
+    sign: Lane,
+}
+
 impl Chain<'_> {
     /// `P(z_j flips)/P(z_j stays)` a priori of the eight of a chunk, `sign` is +1 where they are in.
     #[inline(always)]
@@ -78,8 +89,48 @@ impl Chain<'_> {
     /// Ratios of eight flips.
     #[inline(always)]
     pub(super) fn evaluate<S: Simd>(&mut self, simd: S, index: usize) {
+        let standard = self.walker.standard;
+        let misfit = 1.0 + self.walker.tableau.excess;
+        let Flips {
+            d,
+            square,
+            over,
+            sign,
+        } = self.flips(index);
+        let mut odds = self.chunk_odds(index, &sign);
+        self.guide_odds(index, &mut odds);
+        let chunk = &mut self.chunks[index];
+        let mut stay = [0.0; LANES];
+        let (odds, d) = (S::as_simd_f64s(&odds).0, S::as_simd_f64s(&d).0);
+        let (square, over) = (S::as_simd_f64s(&square).0, S::as_simd_f64s(&over).0);
+        let sign = S::as_simd_f64s(&sign).0;
+        let conditional = S::as_mut_simd_f64s(&mut chunk.conditional).0;
+        let stays = S::as_mut_simd_f64s(&mut stay).0;
+        let (zero, one) = (simd.splat_f64s(0.0), simd.splat_f64s(1.0));
+        let (least, most) = (
+            simd.splat_f64s(f64::MIN_POSITIVE),
+            simd.splat_f64s(RATIO_MAX),
+        );
+        let (misfit, power) = (simd.splat_f64s(misfit), simd.splat_f64s(-standard.shape));
+        let lazy = simd.splat_f64s(-LAZY);
+        for v in 0..odds.len() {
+            let gain = simd.div_f64s(square[v], simd.mul_f64s(over[v], misfit));
+            let change = simd.max_f64s(simd.mul_add_e_f64s(sign[v], gain, one), least);
+            let weight = exp(simd, simd.mul_f64s(power, ln(simd, change)));
+            let ratio = simd.div_f64s(odds[v], simd.sqrt_f64s(d[v]));
+            let r = simd.min_f64s(simd.mul_f64s(ratio, weight), most);
+            let inside = simd.select_f64s(simd.less_than_f64s(zero, sign[v]), one, r);
+            conditional[v] = simd.div_f64s(inside, simd.add_f64s(one, r));
+            stays[v] = simd.mul_add_e_f64s(lazy, simd.min_f64s(r, one), one);
+        }
+        chunk.stays = running_product(stay);
+        chunk.version = self.version;
+    }
+
+    /// What the ratios of eight flips are made of.
+    #[inline(always)]
+    fn flips(&self, index: usize) -> Flips {
         let (tableau, standard) = (&self.walker.tableau, self.walker.standard);
-        let misfit = 1.0 + tableau.excess;
         let (mut d, mut square, mut over) = ([1.0; LANES], [0.0; LANES], [1.0; LANES]);
         let mut sign = [-1.0; LANES];
         if let Some(first) = self.chunks[index].first {
@@ -115,34 +166,12 @@ impl Chain<'_> {
                 sign[lane] = tableau.sign[standard.blocks[block].start];
             }
         }
-        let mut odds = self.chunk_odds(index, &sign);
-        self.guide_odds(index, &mut odds);
-        let chunk = &mut self.chunks[index];
-        let mut stay = [0.0; LANES];
-        let (odds, d) = (S::as_simd_f64s(&odds).0, S::as_simd_f64s(&d).0);
-        let (square, over) = (S::as_simd_f64s(&square).0, S::as_simd_f64s(&over).0);
-        let sign = S::as_simd_f64s(&sign).0;
-        let conditional = S::as_mut_simd_f64s(&mut chunk.conditional).0;
-        let stays = S::as_mut_simd_f64s(&mut stay).0;
-        let (zero, one) = (simd.splat_f64s(0.0), simd.splat_f64s(1.0));
-        let (least, most) = (
-            simd.splat_f64s(f64::MIN_POSITIVE),
-            simd.splat_f64s(RATIO_MAX),
-        );
-        let (misfit, power) = (simd.splat_f64s(misfit), simd.splat_f64s(-standard.shape));
-        let lazy = simd.splat_f64s(-LAZY);
-        for v in 0..odds.len() {
-            let gain = simd.div_f64s(square[v], simd.mul_f64s(over[v], misfit));
-            let change = simd.max_f64s(simd.mul_add_e_f64s(sign[v], gain, one), least);
-            let weight = exp(simd, simd.mul_f64s(power, ln(simd, change)));
-            let ratio = simd.div_f64s(odds[v], simd.sqrt_f64s(d[v]));
-            let r = simd.min_f64s(simd.mul_f64s(ratio, weight), most);
-            let inside = simd.select_f64s(simd.less_than_f64s(zero, sign[v]), one, r);
-            conditional[v] = simd.div_f64s(inside, simd.add_f64s(one, r));
-            stays[v] = simd.mul_add_e_f64s(lazy, simd.min_f64s(r, one), one);
+        Flips {
+            d,
+            square,
+            over,
+            sign,
         }
-        chunk.stays = running_product(stay);
-        chunk.version = self.version;
     }
 }
 
