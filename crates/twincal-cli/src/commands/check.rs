@@ -52,6 +52,31 @@ struct Checked {
     findings: Vec<Finding>,
 }
 
+impl Checked {
+    fn of(
+        (assessment, gates, findings): (Assessment, Vec<Gate>, Vec<Finding>),
+        validation: Validation,
+        changes: Vec<Change>,
+    ) -> Self {
+        let verdict = Verdict::of(assessment.answer);
+        Self {
+            schema: 1,
+            assessment: Versioned::from(assessment),
+            verdict,
+            passed: verdict == Verdict::Passed,
+            gates,
+            changes,
+            signal: "filtered",
+            filtered: validation.filtered,
+            moving: validation.moving,
+            within: validation.within,
+            beyond: validation.beyond,
+            raw: validation.raw,
+            findings,
+        }
+    }
+}
+
 pub(super) fn run(flags: &Check, terminal: &mut Terminal) -> Outcome<u8> {
     let config = settings::beside_twin(&flags.log)?;
     let settings = config.settings()?;
@@ -59,18 +84,7 @@ pub(super) fn run(flags: &Check, terminal: &mut Terminal) -> Outcome<u8> {
     let progress = Progress::new();
     progress.step(&format!("reading {}", flags.twin.to_string_lossy()));
     let stored = StoredTwin::read(&Artifact::open(&flags.twin)?, false)?;
-    let validation = &stored.calibration.validation;
-    let no_rows = validation
-        .filtered
-        .joints
-        .iter()
-        .all(|joint| joint.rows == 0);
-    if validation.split == Split::NotTested || no_rows {
-        return Err(Failure::usage(
-            "the twin was never tested: it has no error that new ones could be compared with",
-            "fit again with --heldout LOG",
-        ));
-    }
+    require_tested(&stored.calibration.validation)?;
     let twin = &stored.calibration.twin;
     let mut logs = LogInput::for_twin(&flags.logs, &stored, settings.log.clone(), &progress)?;
     progress.step("predicting the logs");
@@ -83,10 +97,8 @@ pub(super) fn run(flags: &Check, terminal: &mut Terminal) -> Outcome<u8> {
     drop(progress);
     require_strict(settings.log.strict, &found)?;
     let known = known_logs(&logs.files, &stored);
-    let fitted = known
-        .iter()
-        .filter(|finding| finding.code == Code::LogWasFitted);
-    let fitted = fitted.count() == logs.files.len();
+    let was_fitted = known.iter().filter(|own| own.code == Code::LogWasFitted);
+    let fitted = was_fitted.count() == logs.files.len();
     let own = Own::of(&stored, gates, fitted);
     let mut gates = judge(&validation, &own);
     gates.extend(changes::gates(&changes, least));
@@ -96,30 +108,8 @@ pub(super) fn run(flags: &Check, terminal: &mut Terminal) -> Outcome<u8> {
     let verdict = Verdict::of(assessment.answer);
     let code = exit::of_check(assessment.answer, &found);
     if settings.json {
-        let Validation {
-            filtered,
-            moving,
-            within,
-            beyond,
-            raw,
-            ..
-        } = validation;
-        let checked = Checked {
-            schema: 1,
-            assessment: Versioned::from(assessment),
-            verdict,
-            passed: verdict == Verdict::Passed,
-            gates,
-            changes,
-            signal: "filtered",
-            filtered,
-            moving,
-            within,
-            beyond,
-            raw,
-            findings: found,
-        };
-        print_json(terminal, &checked)?;
+        let said = (assessment, gates, found);
+        print_json(terminal, &Checked::of(said, validation, changes))?;
         return Ok(code);
     }
     terminal.heading(verdict.word());
@@ -135,6 +125,19 @@ pub(super) fn run(flags: &Check, terminal: &mut Terminal) -> Outcome<u8> {
     terminal.say("");
     findings(&found, Notes::In("the output of --json"), terminal);
     Ok(code)
+}
+
+/// # Errors
+/// For a twin without an error that new ones could be compared with.
+fn require_tested(validation: &Validation) -> Outcome<()> {
+    let mut joints = validation.filtered.joints.iter();
+    if validation.split != Split::NotTested && joints.any(|joint| joint.rows > 0) {
+        return Ok(());
+    }
+    Err(Failure::usage(
+        "the twin was never tested: it has no error that new ones could be compared with",
+        "fit again with --heldout LOG",
+    ))
 }
 
 /// What the verdict rests on: gates that fail, or, where they hold, what is wrong with the log; that is no longer among the findings then.

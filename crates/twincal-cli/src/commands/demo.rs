@@ -72,15 +72,9 @@ pub(super) fn run(flags: &Demo, terminal: &mut Terminal) -> Outcome<u8> {
     )?;
     let logs = LogInput::carried(&TRAIN, &robot.robot, &settings.log)?;
     let heldout = LogInput::carried(&HELDOUT, &robot.robot, &settings.log)?;
-    let paths = |logs: &[(&str, &[u8])]| {
-        logs.iter()
-            .map(|(name, _)| PathBuf::from(name))
-            .collect::<Vec<_>>()
-    };
-    let command = command(Path::new(MODEL.0), &paths(&TRAIN), &paths(&HELDOUT), "");
     let job = Job {
         maker: Maker::Demo,
-        command,
+        command: as_a_fit(),
         config: &config,
         settings: &settings,
         robot,
@@ -90,12 +84,7 @@ pub(super) fn run(flags: &Demo, terminal: &mut Terminal) -> Outcome<u8> {
         output,
         watch,
     };
-    // The inputs lie beside the result, so that the command in the report can be repeated there.
-    let carried = std::iter::once(&MODEL).chain(&TRAIN).chain(&HELDOUT);
-    let inputs = carried
-        .map(|(name, bytes)| (*name, bytes.to_vec()))
-        .collect();
-    let done = job.run(claim, inputs, progress, terminal)?;
+    let done = job.run(claim, beside(), progress, terminal)?;
     let truth = truth::beside(&done.stored.calibration, terminal.width())?;
     let end = end(output);
     let around = Around {
@@ -116,6 +105,21 @@ pub(super) fn run(flags: &Demo, terminal: &mut Terminal) -> Outcome<u8> {
         open(&output.join(REPORT), terminal);
     }
     Ok(done.code)
+}
+
+/// The inputs, which lie beside the result: the command in the report can be repeated there.
+fn beside() -> Vec<(&'static str, Vec<u8>)> {
+    let carried = std::iter::once(&MODEL).chain(&TRAIN).chain(&HELDOUT);
+    let carried = carried.map(|(name, bytes)| (*name, bytes.to_vec()));
+    carried.collect()
+}
+
+/// The command that makes the same twin of the files in the folder.
+fn as_a_fit() -> String {
+    let paths = |logs: &[(&str, &[u8])]| -> Vec<PathBuf> {
+        logs.iter().map(|(name, _)| PathBuf::from(name)).collect()
+    };
+    command(Path::new(MODEL.0), &paths(&TRAIN), &paths(&HELDOUT), "")
 }
 
 /// How to open the page, and the command to try next.

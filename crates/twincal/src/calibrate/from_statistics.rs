@@ -125,24 +125,17 @@ fn road(
         fit,
     };
     findings.extend(data.findings.iter().cloned());
-    let pipeline = &statistics.plan.pipeline;
-    let checked = self_check(robot, pipeline, trajectories.heldout.iter())?;
-    if pooled.is_none() {
-        findings.extend(odd(statistics, &trajectories, checked.is_empty()));
-    }
-    findings.extend(checked);
+    // Logs of a fleet's robot are compared where that robot is fitted.
+    findings.extend(checked(statistics, &trajectories, pooled.is_none())?);
     let plan = held_out::plan_of_heldout(&data, &trajectories);
     let (validation, more) = held_out::validate(own, library, plan, Vec::new(), progress)?;
     findings.extend(more);
-    findings.extend(worse::findings(robot, &validation.filtered));
-    findings.extend(worse::of_compact(validation.compact));
+    findings.extend(worse::of_validation(robot, &validation));
     progress(Stage::Sensitivity)?;
     let opinion = opinion((library, pooled), (fit, sums), &compact);
     let (zero, states) = (&known.zero_columns, &facts.states);
     let excitation = unseen::excitation(robot, &known.every_candidate, zero, &fit.gram, states);
-    let mut facts = facts.clone();
-    let heldout = data.heldout.iter().map(|log| log.summary.clone());
-    facts.summaries.extend(heldout);
+    let facts = facts.with_heldout(&data.heldout);
     let pieces = Pieces {
         twin,
         library,
@@ -365,13 +358,17 @@ fn compared(statistics: &Statistics, (heldout, data): (&Logs<'_>, &Data)) -> Res
     Ok(findings)
 }
 
-/// Torque of a log, or a joint, that the others contradict. `heldout_is_right`: the self-check found nothing in the held-out logs.
-fn odd(
+/// What motion and model say of the held-out logs, and, `with_others`, torque of a log or a joint that the others contradict.
+fn checked(
     statistics: &Statistics,
     trajectories: &all_logs::Trajectories,
-    heldout_is_right: bool,
-) -> Vec<Finding> {
+    with_others: bool,
+) -> Result<Vec<Finding>> {
     let (robot, pipeline) = (&statistics.robot, &statistics.plan.pipeline);
+    let checked = self_check(robot, pipeline, trajectories.heldout.iter())?;
+    if !with_others {
+        return Ok(checked);
+    }
     let fitted = statistics.logs.iter().map(|log| Compared {
         name: log.name(),
         payload: log.about.facts.payload,
@@ -380,8 +377,11 @@ fn odd(
     let heldout = trajectories.heldout.iter();
     let heldout = heldout.map(|log| Compared::of(pipeline, log));
     let all: Vec<Compared<'_>> = fitted.chain(heldout).collect();
-    let right = heldout_is_right && statistics.logs.iter().all(|log| log.about.signs_are_right);
-    odd_torque(robot, &all, right)
+    let mut fitted = statistics.logs.iter();
+    let right = checked.is_empty() && fitted.all(|log| log.about.signs_are_right);
+    let mut findings = odd_torque(robot, &all, right);
+    findings.extend(checked);
+    Ok(findings)
 }
 
 /// Rows and motion of the held-out logs.

@@ -287,47 +287,24 @@ struct Names<'a> {
 impl Names<'_> {
     fn factor(&self, whose: Whose, factor: f64, sd: f64) -> Finding {
         let size = format!("{factor:.2} ± {}", significant(sd.max(0.001), 1));
-        let (code, subject, what, others, columns) = match whose {
+        let (code, subject, what) = match whose {
             Whose::Log(log) => {
                 let name = self.logs[log];
-                let others = match &self.logs[..] {
-                    [a, b] => format!(
-                        "`{}` says of the same robot, or the other way round",
-                        if *a == name { b } else { a }
-                    ),
-                    _ => "the other logs say of the same robot".to_owned(),
-                };
-                (
-                    Code::LogTorqueFactor,
-                    name,
-                    format!("log `{name}`"),
-                    others,
-                    "its torque columns",
-                )
+                (Code::LogTorqueFactor, name, format!("log `{name}`"))
             }
             Whose::Block { log, joint } => {
                 let (log, joint) = (self.logs[log], self.joints[joint]);
                 let what = format!("log `{log}`, joint `{joint}`");
-                let others = "the other logs and joints say of the same robot".to_owned();
-                (
-                    Code::LogTorqueFactor,
-                    log,
-                    what,
-                    others,
-                    "its torque column",
-                )
+                (Code::LogTorqueFactor, log, what)
             }
             Whose::Joint(joint) => {
                 let name = self.joints[joint];
-                let others = "the other joints say of the links that it moves".to_owned();
-                (
-                    Code::JointTorqueFactor,
-                    name,
-                    format!("joint `{name}`"),
-                    others,
-                    "its torque column",
-                )
+                (Code::JointTorqueFactor, name, format!("joint `{name}`"))
             }
+        };
+        let columns = match whose {
+            Whose::Log(_) => "its torque columns",
+            Whose::Block { .. } | Whose::Joint(_) => "its torque column",
         };
         let mistake = match factor < 0.0 {
             true => "a sign, ",
@@ -344,13 +321,28 @@ impl Names<'_> {
             code,
             subject,
             format!(
-                "{what}: measured torque is {size} times what {others}: look for {mistake}a gain, gear ratio or torque constant there, and multiply \
+                "{what}: measured torque is {size} times what {}: look for {mistake}a gain, gear ratio or torque constant there, and multiply \
                  {columns} by {}{load}",
+                self.others(whose),
                 significant(1.0 / factor, 3)
             ),
             0,
         )
         .with([("factor", factor), ("factor_sd", sd)])
+    }
+
+    /// What the torque is compared with.
+    fn others(&self, whose: Whose) -> String {
+        let others = match (whose, &self.logs[..]) {
+            (Whose::Log(log), [one, other]) => {
+                let other = if log == 0 { other } else { one };
+                return format!("`{other}` says of the same robot, or the other way round");
+            }
+            (Whose::Log(_), _) => "the other logs say of the same robot",
+            (Whose::Block { .. }, _) => "the other logs and joints say of the same robot",
+            (Whose::Joint(_), _) => "the other joints say of the links that it moves",
+        };
+        others.to_owned()
     }
 
     fn lag(&self, log: usize, lag: f64, sd: f64) -> Finding {

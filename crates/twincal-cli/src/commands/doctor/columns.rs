@@ -48,10 +48,33 @@ pub(super) fn columns(examination: &Examination, logs: usize, settings: &Setting
         is_logged(|joint| joint.acceleration.is_some()),
         true,
     ];
-    let mut whys = Vec::new();
-    if let Some(Degrees { factors, joints }) = examination.degrees(logs) {
+    let degrees = examination.degrees(logs);
+    let of_degrees = degrees.map(|own| all.convert(examination, own, logged));
+    let joints = &examination.checkup.joints;
+    let turned = joints.iter().filter(|check| is_turned(check));
+    let mut whys: Vec<String> = of_degrees.into_iter().collect();
+    whys.extend(turned.map(|check| all.turn(examination, check, logged)));
+    whys.extend(all.scale(examination));
+    all.why = whys.join(" ");
+    if joints.iter().any(is_moved) && reorder(examination, &mut all.table) {
+        all.fixed.push(Fixed::Finding(Code::JointOrder));
+    }
+    all
+}
+
+/// Whether position, velocity, acceleration and torque are logged.
+type Logged = [bool; 4];
+
+impl Columns {
+    /// Radians of degrees; why.
+    fn convert(
+        &mut self,
+        examination: &Examination,
+        Degrees { factors, joints }: &Degrees,
+        logged: Logged,
+    ) -> String {
         let [position, rates] = *factors;
-        let factor = &mut all.table.factor;
+        let factor = &mut self.table.factor;
         let channels = [
             (&mut factor.q, position),
             (&mut factor.qd, rates),
@@ -62,12 +85,13 @@ pub(super) fn columns(examination: &Examination, logs: usize, settings: &Setting
                 *factor = of_joints(examination, joints, number);
             }
         }
-        whys.push("Positions or velocities are logged in degrees.".to_owned());
-        all.fixed.push(Fixed::Degrees);
+        self.fixed.push(Fixed::Degrees);
+        "Positions or velocities are logged in degrees.".to_owned()
     }
-    let joints = &examination.checkup.joints;
-    for check in joints.iter().filter(|check| is_turned(check)) {
-        let factor = &mut all.table.factor;
+
+    /// Turns a joint round; why.
+    fn turn(&mut self, examination: &Examination, check: &JointCheck, logged: Logged) -> String {
+        let factor = &mut self.table.factor;
         let [position, rates, torque] = signs(check);
         let channels = [
             (&mut factor.q, position),
@@ -80,36 +104,42 @@ pub(super) fn columns(examination: &Examination, logs: usize, settings: &Setting
                 multiply(factor, examination, &check.joint, -1.0);
             }
         }
-        whys.push(format!("The sign of {} is reversed.", check.joint));
-        all.fixed.push(Fixed::Finding(Code::SignFlip));
+        self.fixed.push(Fixed::Finding(Code::SignFlip));
+        format!("The sign of {} is reversed.", check.joint)
     }
-    let scaled: Vec<&JointCheck> = joints
-        .iter()
-        .filter(|j| j.torque_factor.is_some())
-        .collect();
-    for check in &scaled {
-        let number = check.torque_factor.unwrap_or(1.0);
-        multiply(&mut all.table.factor.tau, examination, &check.joint, number);
-    }
-    if !scaled.is_empty() {
+
+    /// N·m of torque in another unit; why, where there is some.
+    fn scale(&mut self, examination: &Examination) -> Option<String> {
+        let joints = &examination.checkup.joints;
+        let scaled: Vec<&JointCheck> = joints
+            .iter()
+            .filter(|joint| joint.torque_factor.is_some())
+            .collect();
+        for check in &scaled {
+            let number = check.torque_factor.unwrap_or(1.0);
+            multiply(
+                &mut self.table.factor.tau,
+                examination,
+                &check.joint,
+                number,
+            );
+        }
+        if scaled.is_empty() {
+            return None;
+        }
+        let mut scales = (examination.findings.iter()).filter(|f| f.code == Code::TorqueScale);
+        let has_factor =
+            |f: &Finding| f.subject.is_empty() || scaled.iter().any(|c| c.joint == f.subject);
+        if scales.all(has_factor) {
+            self.fixed.push(Fixed::Finding(Code::TorqueScale));
+        }
         let names: Vec<&str> = scaled.iter().map(|check| check.joint.as_str()).collect();
         let whose = match names.len() == joints.len() {
             true => "All torque".to_owned(),
             false => format!("Torque of {}", listed(&names, ", ")),
         };
-        whys.push(format!("{whose} looks like thousandths of N·m."));
+        Some(format!("{whose} looks like thousandths of N·m."))
     }
-    let mut scales = (examination.findings.iter()).filter(|f| f.code == Code::TorqueScale);
-    let has_factor =
-        |f: &Finding| f.subject.is_empty() || scaled.iter().any(|c| c.joint == f.subject);
-    if !scaled.is_empty() && scales.all(has_factor) {
-        all.fixed.push(Fixed::Finding(Code::TorqueScale));
-    }
-    all.why = whys.join(" ");
-    if joints.iter().any(is_moved) && reorder(examination, &mut all.table) {
-        all.fixed.push(Fixed::Finding(Code::JointOrder));
-    }
-    all
 }
 
 /// The line that turns the signs of a joint.

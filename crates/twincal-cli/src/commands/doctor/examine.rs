@@ -277,58 +277,17 @@ impl Examination {
 
     /// Overviews, filters, comparison and outlook, as far as each of them goes.
     fn look(&mut self, logs: &mut LogInput, settings: &Settings) {
-        let robot = &self.robot.robot;
-        let mut together = filtered(robot, &logs.logs, settings);
+        let mut together = filtered(&self.robot.robot, &logs.logs, settings);
         if together.is_err() {
             // Which of them it is, and whether other units help.
-            for log in &mut logs.logs {
-                for _ in 0..MISTAKES {
-                    let one = std::slice::from_ref(log);
-                    let Err(error) = filtered(robot, one, settings) else {
-                        break;
-                    };
-                    // A log in which nothing moves may still be one of several.
-                    if matches!(error, twincal::Error::Refused { .. }) {
-                        break;
-                    }
-                    let mut refusal = Refusal::from(Failure::from(error.clone()));
-                    let Some(repaired) = converted(robot, log, &error, settings) else {
-                        self.refusals.push(refusal);
-                        break;
-                    };
-                    self.converted.push(repaired.words);
-                    refusal.time_unit = repaired.time;
-                    refusal.degrees = repaired.degrees;
-                    *log = repaired.log;
-                    self.refusals.push(refusal);
-                }
-            }
+            let all = logs.logs.iter_mut();
+            all.for_each(|log| self.repair(log, settings));
+            let robot = &self.robot.robot;
             (logs.logs).retain(|log| describe(robot, log).is_ok());
             together = filtered(robot, &logs.logs, settings);
         }
-        let names = robot.joint_names();
-        for log in &logs.logs {
-            let with_torque = log.any_recording(|recording| recording.require_torque(&names));
-            if let Err(error) = with_torque {
-                self.refusals.push(Failure::from(error).into());
-            }
-        }
-        for log in &logs.logs {
-            if let Ok(((overview, more), steps)) =
-                describe(robot, log).and_then(|seen| Ok((seen, steps(robot, log)?)))
-            {
-                self.overviews.push(overview);
-                self.steps.push(steps);
-                self.findings.extend(more);
-            }
-        }
         let logs = &logs.logs[..];
-        for said in [hardly_driven(robot, logs), constant_torque(robot, logs)] {
-            match said {
-                Ok(said) => self.findings.extend(said),
-                Err(error) => self.refusals.push(Failure::from(error).into()),
-            }
-        }
+        self.say_what_was_logged(logs);
         let (pipeline, more, mut checkup) = match together {
             Ok(filtered) => filtered,
             Err(error) => {
@@ -341,7 +300,7 @@ impl Examination {
         self.findings.extend(more);
         self.findings.append(&mut checkup.findings);
         let aligned = Some((&pipeline, checkup.looked_at(logs)));
-        match outlook(robot, &settings.calibration.library, aligned) {
+        match outlook(&self.robot.robot, &settings.calibration.library, aligned) {
             Ok(outlook) => {
                 self.findings.extend(outlook.findings.iter().cloned());
                 self.outlook = Some(outlook);
@@ -357,6 +316,56 @@ impl Examination {
             rate_hz: pipeline.common_rate(kept),
             ..pipeline
         });
+    }
+
+    /// Why a log is refused, and the log in other units where those help.
+    fn repair(&mut self, log: &mut Log<'static>, settings: &Settings) {
+        let robot = &self.robot.robot;
+        for _ in 0..MISTAKES {
+            let Err(error) = filtered(robot, std::slice::from_ref(log), settings) else {
+                break;
+            };
+            // A log in which nothing moves may still be one of several.
+            if matches!(error, twincal::Error::Refused { .. }) {
+                break;
+            }
+            let mut refusal = Refusal::from(Failure::from(error.clone()));
+            let Some(repaired) = converted(robot, log, &error, settings) else {
+                self.refusals.push(refusal);
+                break;
+            };
+            self.converted.push(repaired.words);
+            refusal.time_unit = repaired.time;
+            refusal.degrees = repaired.degrees;
+            *log = repaired.log;
+            self.refusals.push(refusal);
+        }
+    }
+
+    /// What logs hold, before any filter.
+    fn say_what_was_logged(&mut self, logs: &[Log<'_>]) {
+        let robot = &self.robot.robot;
+        let names = robot.joint_names();
+        for log in logs {
+            let with_torque = log.any_recording(|recording| recording.require_torque(&names));
+            if let Err(error) = with_torque {
+                self.refusals.push(Failure::from(error).into());
+            }
+        }
+        for log in logs {
+            let seen = describe(robot, log).and_then(|seen| Ok((seen, steps(robot, log)?)));
+            if let Ok(((overview, more), steps)) = seen {
+                self.overviews.push(overview);
+                self.steps.push(steps);
+                self.findings.extend(more);
+            }
+        }
+        for said in [hardly_driven(robot, logs), constant_torque(robot, logs)] {
+            match said {
+                Ok(said) => self.findings.extend(said),
+                Err(error) => self.refusals.push(Failure::from(error).into()),
+            }
+        }
     }
 
     /// Fits: what only a fit can tell (rows that count as too few) is a reason to stop as well. A lower cut-off is advised if

@@ -8,6 +8,7 @@ mod print;
 mod propose;
 mod units;
 
+use super::checkup::Checkup;
 use super::inspect::library::{ComponentRow, component_rows};
 use super::settings::{Look, Usual};
 use super::{print_json, reads, require_strict, settings, start_threads};
@@ -20,6 +21,7 @@ use examine::{Examination, Mapping, Refusal, Trial, examine};
 use propose::propose;
 use remedies::{Advice, remedies};
 use serde::Serialize;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use twincal::Finding;
 use twincal::incidents::Incident;
@@ -142,6 +144,14 @@ pub(super) fn run(flags: &args::Doctor, terminal: &mut Terminal) -> Outcome<u8> 
     Ok(diagnosis.exit_code)
 }
 
+/// What `init --json` prints.
+#[derive(Serialize)]
+struct Written<'a> {
+    schema: u64,
+    output: &'a str,
+    config: &'a str,
+}
+
 pub(super) fn init(flags: &args::Init, terminal: &mut Terminal) -> Outcome<u8> {
     let asked = Asked::of(&flags.look, "init", terminal)?;
     let target = flags.output.clone().unwrap_or_else(|| USUAL.into());
@@ -178,12 +188,6 @@ pub(super) fn init(flags: &args::Init, terminal: &mut Terminal) -> Outcome<u8> {
     terminal.complete(&target);
     let shown = target.to_string_lossy();
     if asked.settings.json {
-        #[derive(Serialize)]
-        struct Written<'a> {
-            schema: u64,
-            output: &'a str,
-            config: &'a str,
-        }
         let written = Written {
             schema: 1,
             output: &shown,
@@ -205,6 +209,40 @@ pub(super) fn init(flags: &args::Init, terminal: &mut Terminal) -> Outcome<u8> {
     Ok(exit::of_findings(&examination.findings))
 }
 
+/// What stands behind the verdict: how much there is to fix. Refusals are remedies of now.
+fn to_fix(remedies: &[Advice]) -> String {
+    let count = |when: When| {
+        let of = |remedy: &&Advice| remedy.wrong && remedy.when == when;
+        remedies.iter().filter(of).count()
+    };
+    match (count(When::Now), count(When::NextLog)) {
+        (0, 0) => String::new(),
+        (now, 0) => format!("; {now} to fix"),
+        (0, next) => format!("; {next} to do better in the next log"),
+        (now, next) => format!("; {now} to fix, {next} to do better in the next log"),
+    }
+}
+
+/// What was seen of each log.
+fn log_rows(
+    overviews: impl Iterator<Item = (LogOverview, Vec<Steps>)>,
+    mappings: Vec<(String, Mapping)>,
+    checkup: &mut Checkup,
+) -> Vec<LogRow> {
+    let mut mappings: BTreeMap<String, Mapping> = mappings.into_iter().collect();
+    let row = |(overview, steps): (LogOverview, Vec<Steps>)| LogRow {
+        columns: mappings.remove(&overview.name),
+        velocity: checkup.agreement.remove(&overview.name).unwrap_or_default(),
+        lag: (checkup.lags.iter().flat_map(|lags| &lags.logs))
+            .find(|log| log.log == overview.name)
+            .cloned(),
+        incidents: checkup.incidents.remove(&overview.name).unwrap_or_default(),
+        overview,
+        steps,
+    };
+    overviews.map(row).collect()
+}
+
 fn diagnosis(examination: Examination, asked: &Asked) -> Diagnosis {
     let remedies = remedies(&examination);
     let folder = Path::new("");
@@ -212,17 +250,7 @@ fn diagnosis(examination: Examination, asked: &Asked) -> Diagnosis {
     let refused = examination.refusals.iter().map(|refusal| refusal.exit_code);
     let degraded = exit::of_findings(&examination.findings);
     let exit_code = refused.clone().min().unwrap_or(degraded);
-    let count = |when: When| {
-        let of = |remedy: &&Advice| remedy.wrong && remedy.when == when;
-        remedies.iter().filter(of).count()
-    };
-    // Refusals are remedies of now.
-    let to_fix = match (count(When::Now), count(When::NextLog)) {
-        (0, 0) => String::new(),
-        (now, 0) => format!("; {now} to fix"),
-        (0, next) => format!("; {next} to do better in the next log"),
-        (now, next) => format!("; {now} to fix, {next} to do better in the next log"),
-    };
+    let to_fix = to_fix(&remedies);
     let verdict = match (refused.count(), degraded) {
         (0, 0) => format!("fit would go ahead{to_fix}"),
         (0, _) => format!("fit would go ahead, but call the data degraded{to_fix}"),
@@ -252,8 +280,7 @@ fn diagnosis(examination: Examination, asked: &Asked) -> Diagnosis {
         findings,
         ..
     } = examination;
-    let mut mappings: std::collections::BTreeMap<String, Mapping> = mappings.into_iter().collect();
-    let logs = overviews.into_iter().zip(steps);
+    let overviews = overviews.into_iter().zip(steps);
     Diagnosis {
         schema: 1,
         model: robot.file.name,
@@ -261,18 +288,7 @@ fn diagnosis(examination: Examination, asked: &Asked) -> Diagnosis {
         exit_code,
         refusals,
         converted,
-        logs: logs
-            .map(|(overview, steps)| LogRow {
-                columns: mappings.remove(&overview.name),
-                velocity: checkup.agreement.remove(&overview.name).unwrap_or_default(),
-                lag: (checkup.lags.iter().flat_map(|lags| &lags.logs))
-                    .find(|log| log.log == overview.name)
-                    .cloned(),
-                incidents: checkup.incidents.remove(&overview.name).unwrap_or_default(),
-                overview,
-                steps,
-            })
-            .collect(),
+        logs: log_rows(overviews, mappings, &mut checkup),
         lags: checkup.lags,
         joints: checkup.joints,
         pipeline,

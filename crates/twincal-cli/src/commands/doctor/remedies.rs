@@ -78,30 +78,30 @@ pub(super) fn remedies(examination: &Examination) -> Vec<Advice> {
             let _ = write!(advice.problem, " ({more} more like this, --json)");
         }
     }
-    if let Some(excitation) = examination
-        .outlook
-        .as_ref()
-        .and_then(|o| o.excitation.as_ref())
-        && let Some(unseen) = excitation.unseen.first()
-    {
-        let [robot, logs] = excitation.directions;
-        let joint = unseen.joint.as_deref().unwrap_or("several joints at once");
-        all.push(Advice {
-            problem: format!(
-                "the logs show {logs} of {robot} identifiable combinations; {} more would come from moving {joint}",
-                unseen.directions
-            ),
-            how: format!(
-                "for the next log: {}",
-                twincal::excitation::sentence(unseen)
-            ),
-            wrong: false,
-            when: When::NextLog,
-            rank: LAST + 3,
-        });
-    }
+    all.extend(of_excitation(examination));
     all.sort_by_key(|advice| advice.rank);
     all
+}
+
+/// Which motion would show most of what these logs do not.
+fn of_excitation(examination: &Examination) -> Option<Advice> {
+    let excitation = examination.outlook.as_ref()?.excitation.as_ref()?;
+    let unseen = excitation.unseen.first()?;
+    let [robot, logs] = excitation.directions;
+    let joint = unseen.joint.as_deref().unwrap_or("several joints at once");
+    Some(Advice {
+        problem: format!(
+            "the logs show {logs} of {robot} identifiable combinations; {} more would come from moving {joint}",
+            unseen.directions
+        ),
+        how: format!(
+            "for the next log: {}",
+            twincal::excitation::sentence(unseen)
+        ),
+        wrong: false,
+        when: When::NextLog,
+        rank: LAST + 3,
+    })
 }
 
 /// What to do about one finding.

@@ -79,33 +79,8 @@ pub(super) fn change(change: &WriteBack, holds: Holds, terminal: &mut Terminal) 
             "  nothing: no found effect has a place there; the numbers are those of your model",
         );
     }
-    for written in &change.written {
-        let Written {
-            words, place, pip, ..
-        } = written;
-        // The file holds the model average.
-        let text = match written.in_file {
-            Some(value) if written.nearest => format!(
-                "{words} ({place}; in the file {}, nearest to that and the joint's quadratic friction)",
-                short(value)
-            ),
-            Some(value) if *pip > CERTAIN => format!(
-                "{words} ({place}; in the file {}, the average over models, some of which hold other effects beside it)",
-                short(value)
-            ),
-            Some(value) => format!(
-                "{words} ({place}; in the file {}, the average over models with and without it, PIP {})",
-                short(value),
-                probability(*pip)
-            ),
-            None if *pip > CERTAIN => format!("{words} ({place})"),
-            None => format!(
-                "{words} ({place}; {:.0} % of that, its probability)",
-                100.0 * pip
-            ),
-        };
-        paragraph(&text, terminal);
-    }
+    let all = change.written.iter();
+    all.for_each(|written| paragraph(&in_file(written), terminal));
     let changed: Vec<String> = change.links.iter().filter_map(change_of).collect();
     if !changed.is_empty() {
         terminal
@@ -113,6 +88,47 @@ pub(super) fn change(change: &WriteBack, holds: Holds, terminal: &mut Terminal) 
         changed.iter().for_each(|text| paragraph(text, terminal));
     }
     terminal.say("");
+    residual(change, holds, terminal);
+    let (lost, all) = (largest(&change.lost), largest(&change.correction));
+    let lost = if lost > ROUNDING * all {
+        format!("{} N·m rms", short(lost))
+    } else {
+        "nothing".into()
+    };
+    let text = format!("of what went in, {lost} is lost in one physical model");
+    paragraph(&text, terminal);
+    terminal.say("");
+}
+
+/// What was written of an effect. The file holds the model average.
+fn in_file(written: &Written) -> String {
+    let Written {
+        words, place, pip, ..
+    } = written;
+    match written.in_file {
+        Some(value) if written.nearest => format!(
+            "{words} ({place}; in the file {}, nearest to that and the joint's quadratic friction)",
+            short(value)
+        ),
+        Some(value) if *pip > CERTAIN => format!(
+            "{words} ({place}; in the file {}, the average over models, some of which hold other effects beside it)",
+            short(value)
+        ),
+        Some(value) => format!(
+            "{words} ({place}; in the file {}, the average over models with and without it, PIP {})",
+            short(value),
+            probability(*pip)
+        ),
+        None if *pip > CERTAIN => format!("{words} ({place})"),
+        None => format!(
+            "{words} ({place}; {:.0} % of that, its probability)",
+            100.0 * pip
+        ),
+    }
+}
+
+/// What the format cannot hold.
+fn residual(change: &WriteBack, holds: Holds, terminal: &mut Terminal) {
     let (told, rest): (Vec<&Residual>, Vec<&Residual>) = change
         .residual
         .iter()
@@ -144,15 +160,6 @@ pub(super) fn change(change: &WriteBack, holds: Holds, terminal: &mut Terminal) 
             paragraph(&text, terminal);
         }
     }
-    let (lost, all) = (largest(&change.lost), largest(&change.correction));
-    let lost = if lost > ROUNDING * all {
-        format!("{} N·m rms", short(lost))
-    } else {
-        "nothing".into()
-    };
-    let text = format!("of what went in, {lost} is lost in one physical model");
-    paragraph(&text, terminal);
-    terminal.say("");
 }
 
 /// A warning in its place among what is said, as wide as the terminal.

@@ -2,14 +2,21 @@
 
 use crate::error::{Code, Finding, Severity};
 use crate::robot::Robot;
-use crate::validate::{Loss, Scores, WORSE};
+use crate::validate::{Loss, Scores, Validation, WORSE};
 use crate::words::significant;
 
 /// Error of the compact twin over the average's from which it is told.
 const COMPACT: f64 = 1.25;
 
+/// What is worse on held-out rows: than nominal, and of the compact twin than of the average.
+pub(in crate::calibrate) fn of_validation(robot: &Robot, validation: &Validation) -> Vec<Finding> {
+    let mut all = findings(robot, &validation.filtered);
+    all.extend(of_compact(validation.compact));
+    all
+}
+
 /// One finding on all joints together where they are worse than nominal by more than [`WORSE`], else one per joint that is.
-pub(in crate::calibrate) fn findings(robot: &Robot, scores: &Scores) -> Vec<Finding> {
+fn findings(robot: &Robot, scores: &Scores) -> Vec<Finding> {
     let ratio = |[nominal, calibrated]: [f64; 2]| calibrated / nominal;
     if ratio([scores.rmse_nominal, scores.rmse_calibrated]) > WORSE {
         let message = format!(
@@ -41,7 +48,7 @@ pub(in crate::calibrate) fn findings(robot: &Robot, scores: &Scores) -> Vec<Find
 
 /// One on the compact twin where it loses by more than [`COMPACT`] of the error to the average over all models, or says of a held-out row that
 /// it could not be.
-pub(in crate::calibrate) fn of_compact(losses: Option<[Loss; 2]>) -> Option<Finding> {
+fn of_compact(losses: Option<[Loss; 2]>) -> Option<Finding> {
     let [average, own] = losses?;
     let impossible = own.log_score == f64::NEG_INFINITY && average.log_score.is_finite();
     let worse = own.rmse > COMPACT * average.rmse;

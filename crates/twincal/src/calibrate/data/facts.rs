@@ -65,6 +65,16 @@ impl Facts {
     }
 }
 
+impl Facts {
+    /// The same with the summaries of held-out logs.
+    pub(in crate::calibrate) fn with_heldout(&self, heldout: &[Log]) -> Self {
+        let mut all = self.clone();
+        let summaries = heldout.iter().map(|log| log.summary.clone());
+        all.summaries.extend(summaries);
+        all
+    }
+}
+
 impl Data {
     /// What is known of the fit logs beside their rows.
     pub(in crate::calibrate) fn facts(&self) -> Facts {

@@ -57,8 +57,7 @@ pub(in crate::calibrate) fn validate(
     let library = &rows.library;
     let (validation, more) = held_out::validate(own, library, plan, fits_of_folds, progress)?;
     findings.extend(more);
-    findings.extend(worse::findings(robot, &validation.filtered));
-    findings.extend(worse::of_compact(validation.compact));
+    findings.extend(worse::of_validation(robot, &validation));
     Ok(Validated {
         twin,
         fitted,
