@@ -180,6 +180,48 @@ fn a_packed_file_is_unpacked_within_a_limit() {
     contains(&refused(read(&path)), &["refusing to expand"]);
 }
 
+/// One definition is for all messages of a topic: where its channels differ, some of them would be read as what they are not, or left out.
+#[test]
+fn joint_states_on_channels_that_differ_are_refused() {
+    let first_and_second = [
+        (
+            (None, "cdr"),
+            (Some(JOINT_STATE), "cdr"),
+            "type no schema and of type sensor_msgs/msg/JointState",
+        ),
+        (
+            (Some(JOINT_STATE), "cdr"),
+            (Some(JOINT_STATE), "ros1"),
+            "JointState (cdr) and of type sensor_msgs/msg/JointState (ros1)",
+        ),
+        (
+            (Some("std_msgs/msg/Empty"), "cdr"),
+            (Some(JOINT_STATE), "cdr"),
+            "type std_msgs/msg/Empty and of type",
+        ),
+    ];
+    for ((kind, encoding), second, words) in first_and_second {
+        let mut states = Bag::new(None);
+        states.topic("/joint_states", kind, encoding);
+        states.topic("/joint_states", second.0, second.1);
+        for message in both() {
+            states.raw("/joint_states", message.stamp, &message.cdr());
+        }
+        contains(
+            &refused(read_bytes(&states.finish())),
+            &["topic `/joint_states` is of ", words],
+        );
+    }
+    // What nobody reads may differ.
+    let mut states = Bag::new(None);
+    states.topic("/diagnostics", Some("std_msgs/msg/Empty"), "cdr");
+    states.topic("/diagnostics", Some("std_msgs/msg/String"), "cdr");
+    for message in both() {
+        states.message("/joint_states", &message);
+    }
+    is_the_motion(&read_bytes(&states.finish()).unwrap().0, 200, 1.0);
+}
+
 #[test]
 fn an_empty_bag_is_refused() {
     let mut states = Bag::new(None);

@@ -152,7 +152,7 @@ impl<'a> JointStates<'a> {
         self.refuse_long("topic", name)?;
         let name = clean(name);
         if let Some(&known) = self.by_name.get(&name) {
-            self.same_kind(known, kind)?;
+            self.same_kind(known, kind, &clean(encoding))?;
             return Ok(TopicId(known));
         }
         if self.topics.len() == MAX_TOPICS {

@@ -32,19 +32,30 @@ impl JointStates<'_> {
         Ok(Some(number))
     }
 
-    /// A mapped topic whose messages are of several types cannot be read by one definition.
-    pub(super) fn same_kind(&self, known: usize, kind: Option<&str>) -> Result<()> {
+    /// A topic that is read cannot have messages of several types or encodings: one definition is for all of them.
+    pub(super) fn same_kind(&self, known: usize, kind: Option<&str>, encoding: &str) -> Result<()> {
         let topic = &self.topics[known];
-        if topic.mapped.is_none() || topic.kind.as_deref() == kind {
+        let joint_states = kind.is_some_and(|kind| KINDS.contains(&kind));
+        let read = topic.mapped.is_some() || topic.read_as.is_some() || joint_states;
+        // Joint states need no schema: their definition is known.
+        let unnamed = kind.is_none() && topic.mapped.is_none();
+        let same = (topic.kind.as_deref() == kind || unnamed) && topic.encoding == encoding;
+        if !read || same {
             return Ok(());
         }
-        let words = |kind: Option<&str>| kind.unwrap_or("no schema").to_owned();
+        let words = |kind: Option<&str>, encoding: &str| {
+            let kind = kind.unwrap_or("no schema");
+            match topic.kind.as_deref() == Some(kind) {
+                true => format!("{kind} ({encoding})"),
+                false => kind.to_owned(),
+            }
+        };
         Err(self.refuse(
             format!(
                 "topic `{}` is of type {} and of type {}",
                 topic.name,
-                words(topic.kind.as_deref()),
-                words(kind)
+                words(topic.kind.as_deref(), &topic.encoding),
+                words(kind, encoding)
             ),
             "record every type on a topic of its own",
         ))
