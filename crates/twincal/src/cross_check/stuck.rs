@@ -19,6 +19,8 @@ const STEPS: f64 = 10.0;
 const SUDDEN: f64 = 5.0;
 /// Share of its rms velocity that a joint's logged velocity has meanwhile: at rest a velocity has noise and some offset.
 const MOVES: f64 = 0.25;
+/// Way that a velocity makes about its mean, rad or m, from which a position that never changes is wrong: noise and drift of a sensor at rest make less.
+const FROZEN: f64 = 0.1;
 /// Stamps further apart than this many intervals are a gap.
 const GAP: f64 = 3.0;
 
@@ -88,6 +90,9 @@ fn of_joint(recording: &Recording, channels: &Channels) -> Vec<Held> {
     let finite = || q.iter().copied().filter(|q| q.is_finite());
     let range = finite().fold(f64::MIN, f64::max) - finite().fold(f64::MAX, f64::min);
     let least = (STEPS * step).max(TRAVEL * range);
+    if range == 0.0 {
+        return frozen(time, q, channels).into_iter().collect();
+    }
     if !(least.is_finite() && range > least) {
         return Vec::new();
     }
@@ -116,6 +121,18 @@ fn of_joint(recording: &Recording, channels: &Channels) -> Vec<Held> {
         }));
     }
     found
+}
+
+/// A position that is one value throughout while the logged velocity goes to and fro.
+fn frozen(time: &[f64], q: &[f64], channels: &Channels) -> Option<Held> {
+    let qd = channels.qd.as_deref()?;
+    let whole = q.len() >= FEWEST && q.iter().all(|q| q.is_finite());
+    let finite = || qd.iter().copied().filter(|v| v.is_finite());
+    let offset = finite().sum::<f64>() / finite().count().max(1) as f64;
+    let about: Vec<f64> = qd.iter().map(|v| v - offset).collect();
+    let ends = [*time.first()?, *time.last()?];
+    let lost = furthest(&about, (ends[1] - ends[0]) / (time.len().max(2) - 1) as f64);
+    (whole && lost.abs() > FROZEN).then_some(Held { ends, lost })
 }
 
 /// By how much the position steps after its sample `last`, where it does so at once and goes on from there.
@@ -219,11 +236,33 @@ mod tests {
         assert!(held(false, to_the_end).is_empty());
     }
 
+    /// Without a velocity it may be at rest; a velocity of noise (0.05 rad/s) about an offset makes a way of 0.01 rad (sd).
+    #[test]
+    fn a_position_that_never_changes_is_found_where_velocity_moves() {
+        let never = |q: &mut Vec<f64>| q.fill(0.3);
+        let [found] = held(true, never)[..] else {
+            panic!("one stretch");
+        };
+        assert!((found.lost.abs() - 0.8).abs() < 0.2, "{found:?}");
+        assert_eq!(found.ends, [0.0, 2999.0 * INTERVAL]);
+        assert!(held(false, never).is_empty());
+        let mut noise = crate::random::Random::new(3, 0);
+        let time: Vec<f64> = (0..3000).map(|i| f64::from(i) * INTERVAL).collect();
+        let qd = time.iter().map(|_| 0.2 + 0.05 * noise.normal()).collect();
+        let at_rest = Channels {
+            q: vec![0.3; 3000],
+            qd: Some(qd),
+            qdd: None,
+            tau: None,
+            temperature: None,
+        };
+        assert_eq!(frozen(&time, &at_rest.q, &at_rest), None);
+    }
+
     #[test]
     fn rests_slow_parts_repeated_samples_and_spikes_are_none() {
         for velocity in [true, false] {
             assert!(held(velocity, |_| ()).is_empty());
-            assert!(held(velocity, |q| q.iter_mut().for_each(|q| *q = 0.3)).is_empty());
             // Coarse: every value stands for many samples.
             let coarse =
                 |q: &mut Vec<f64>| q.iter_mut().for_each(|q| *q = (*q / 2e-3).round() * 2e-3);
