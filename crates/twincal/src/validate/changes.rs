@@ -10,6 +10,7 @@
 //! with B once what noise of variance σ_j² makes whose rows count as 1/τ_j each, and once the spread of the scores of blocks of rows about δ̂
 //! (Liang & Zeger 1986); the larger doubt counts: Hotelling's T² is compared with χ², and with F for as many blocks as there are.
 
+use super::changed_payload::numbers as numbers_of_payload;
 use crate::error::Result;
 use crate::linear_algebra::{Cholesky, dot};
 use crate::observations::{JointObservations, Observations, observe};
@@ -51,10 +52,11 @@ pub enum ChangeKind {
     JointZero,
 }
 
-/// A coefficient of a change.
+/// A number of a change: a coefficient, or what coefficients of a payload say of its mass and centre of mass.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ChangeNumber {
-    /// Name of the column, as `elbow.viscous`.
+    /// Name of the column, as `elbow.viscous`; of a payload `payload.mass` and `payload.com_x` …, or first moments `payload.mx` … where the mass
+    /// is not clear, in the payload frame.
     pub name: String,
     /// Unit.
     pub unit: String,
@@ -71,7 +73,10 @@ pub struct Change {
     pub kind: ChangeKind,
     /// The joint, or `payload`.
     pub subject: String,
-    /// Its coefficients.
+    /// The frame of a payload's numbers.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub frame: Option<String>,
+    /// Its numbers.
     pub numbers: Vec<ChangeNumber>,
     /// Probability of such an estimate, or one further from 0, without a change.
     pub chance: f64,
@@ -215,21 +220,28 @@ impl<'a> Changes<'a> {
     }
 
     fn told(&self, suspect: &Suspect, own: &Estimate, changed: bool) -> Change {
-        let numbers = suspect.columns.iter().zip(own.value.iter().zip(&own.sd));
+        let size = own.value.len();
+        let number = |(place, &column): (usize, &usize)| {
+            let term = &self.columns.terms()[self.columns.columns()[column]];
+            ChangeNumber {
+                name: term.name.clone(),
+                unit: term.unit.clone(),
+                value: own.value[place],
+                sd: own.covariance[place * size + place].sqrt(),
+            }
+        };
+        let numbers = || suspect.columns.iter().enumerate().map(number).collect();
+        let estimate = (&own.value[..], &own.covariance[..]);
+        let payload = match suspect.kind {
+            ChangeKind::Payload => numbers_of_payload(&self.columns, &suspect.columns, estimate),
+            ChangeKind::Friction | ChangeKind::JointZero => None,
+        };
+        let frame = || self.columns.payload_frame(&self.twin.robot).to_owned();
         Change {
             kind: suspect.kind,
             subject: suspect.subject.clone(),
-            numbers: numbers
-                .map(|(&column, (value, sd))| {
-                    let term = &self.columns.terms()[self.columns.columns()[column]];
-                    ChangeNumber {
-                        name: term.name.clone(),
-                        unit: term.unit.clone(),
-                        value: *value,
-                        sd: *sd,
-                    }
-                })
-                .collect(),
+            frame: payload.is_some().then(frame),
+            numbers: payload.unwrap_or_else(numbers),
             chance: own.chance,
             share: own.share,
             changed,
@@ -331,17 +343,19 @@ impl<'a> Changes<'a> {
             }
         }
         let inverse = factor.inverse();
-        let sd = (0..size).map(|k| {
-            let row = &inverse[k * size..(k + 1) * size];
+        let row = |k: usize| &inverse[k * size..(k + 1) * size];
+        let element = |k: usize, l: usize| {
             let along = (0..size).map(|i| {
-                let both = (0..size).map(|j| (spread[i * size + j] + doubt[i * size + j]) * row[j]);
-                row[i] * both.sum::<f64>()
+                let both =
+                    (0..size).map(|j| (spread[i * size + j] + doubt[i * size + j]) * row(l)[j]);
+                row(k)[i] * both.sum::<f64>()
             });
-            along.sum::<f64>().sqrt()
-        });
+            along.sum::<f64>()
+        };
+        let all = (0..size).flat_map(|k| (0..size).map(move |l| (k, l)));
         let explained = dot(&value, &score);
         Some(Estimate {
-            sd: sd.collect(),
+            covariance: all.map(|(k, l)| element(k, l)).collect(),
             share: self.share(columns, &value),
             inflation: explained / least.max(f64::MIN_POSITIVE),
             value,
@@ -404,7 +418,8 @@ impl<'a> Changes<'a> {
 /// What is known of one change.
 struct Estimate {
     value: Vec<f64>,
-    sd: Vec<f64>,
+    /// Row by row.
+    covariance: Vec<f64>,
     chance: f64,
     share: f64,
     /// `δ̂ᵀA δ̂`, and how much of it is T².

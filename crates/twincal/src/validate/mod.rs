@@ -1,5 +1,6 @@
 //! Held-out scores: how good the twin's torque is on data it has not seen (method section 8).
 
+mod changed_payload;
 mod changes;
 mod conformal;
 mod heldout;

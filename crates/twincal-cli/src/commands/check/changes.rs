@@ -54,7 +54,10 @@ fn words(change: &Change, [limit, least]: [f64; 2]) -> String {
             "Look at its gear, brake and temperature, or fit again.",
         ),
         ChangeKind::Payload => (
-            "payload".to_owned(),
+            match &change.frame {
+                Some(frame) => format!("payload at `{}`", clean(frame)),
+                None => "payload".to_owned(),
+            },
             "Say what the robot carries, take it off, or fit again.",
         ),
         ChangeKind::JointZero => (
@@ -90,17 +93,20 @@ fn probability(p: f64) -> String {
 
 /// `viscous +0.15 ± 0.01 N·m·s/rad`.
 fn number(number: &twincal::validate::ChangeNumber) -> String {
-    let (factor, unit) = match number.name.ends_with(".encoder_zero") {
-        true => Family::EncoderZero.told_in(&number.unit),
-        false => (1.0, number.unit.as_str()),
-    };
     let (_, own) = number.name.rsplit_once('.').unwrap_or(("", &number.name));
+    let (factor, unit) = match own {
+        "encoder_zero" => Family::EncoderZero.told_in(&number.unit),
+        "com_x" | "com_y" | "com_z" => Family::Payload.told_in(&number.unit),
+        _ => (1.0, number.unit.as_str()),
+    };
     let own = match own {
         "encoder_zero" => "moved by",
-        "m" => "mass",
+        "com_x" => "centre of mass x",
+        "com_y" => "y",
+        "com_z" => "z",
         "mx" => "first moment x",
-        "my" => "first moment y",
-        "mz" => "first moment z",
+        "my" => "y",
+        "mz" => "z",
         own => own,
     };
     let plus = if number.value > 0.0 { "+" } else { "" };
