@@ -7,7 +7,7 @@ import re
 
 import pytest
 import specimens
-from conftest import twincal
+from conftest import ROOT, twincal
 
 USABLE = ("yes", "yes_within_limits")
 ROBOTS = [
@@ -67,6 +67,16 @@ def test_a_check_of_what_was_fitted_has_the_exit_code_of_its_answer(made):
     usable = checked["assessment"]["answer"] in USABLE
     expected = 1 if checked["assessment"]["answer"] == "no" else 0 if usable and not lost else 3
     assert done.returncode == expected, checked["assessment"]
+
+
+def test_codes_page_has_every_number_of_every_claim(made):
+    page = (ROOT / "docs" / "codes.md").read_text()
+    sections = dict(re.findall(r"^### `(\w+)`\n(.*?)(?=^### |\Z)", page, re.S | re.M))
+    _, _, _, result = made
+    for claim in result["assessment"]["claims"]:
+        listed = re.findall(r"^- Evidence.*", sections[claim["code"]], re.M)
+        known = set(re.findall(r"`(\w+)`", " ".join(listed))) | {"count", "chapter", "chapters", "chapters_alike"}
+        assert set(claim["evidence"]) <= known, claim
 
 
 # Numbers that stand behind a message and not in it, or as "> 0.999" or "a segment".

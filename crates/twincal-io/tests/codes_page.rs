@@ -3,6 +3,7 @@
 use std::fmt::Write;
 use std::fs;
 use std::path::Path;
+use twincal::assess::NUMBERS;
 use twincal::{Code, Severity};
 use twincal_io::words::{When, remedy};
 
@@ -20,6 +21,16 @@ fn the_page_has_every_code_with_what_its_findings_hold() {
             file.display()
         );
     }
+}
+
+#[test]
+fn the_page_has_every_number_of_claims() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/codes.md");
+    let page = fs::read_to_string(path).expect("docs/codes.md");
+    let row = |(name, meaning): &(&str, &str)| format!("| `{name}` | {meaning} |\n");
+    let table: String = NUMBERS.iter().map(row).collect();
+    let head = "| number | what it is |\n|---|---|\n";
+    assert!(page.contains(&format!("{head}{table}\n")), "{table}");
 }
 
 /// What the page says of a code.
@@ -43,6 +54,12 @@ fn section(code: Code) -> String {
         .collect();
     if !numbers.is_empty() {
         line("Evidence", &numbers.join(", "));
+    }
+    let numbers: Vec<String> = (code.evidence_of_claims().iter())
+        .map(|name| format!("`{name}`"))
+        .collect();
+    if !numbers.is_empty() {
+        line("Evidence of claims", &numbers.join(", "));
     }
     if let Some((_, own)) = remedy(code) {
         let when = match own.when {

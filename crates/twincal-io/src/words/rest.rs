@@ -45,7 +45,7 @@ pub(super) fn error(
 /// "one pause, 0.960 s"; `None` where there are more than a few.
 fn pauses(claim: &Claim) -> Option<String> {
     let most = claim.evidence.get("pauses")?;
-    let seconds = number(claim.number("seconds"), 2);
+    let seconds = number(claim.number("seconds_at_rest"), 2);
     Some(match most {
         1.0 => format!("one pause, {seconds} s"),
         most => format!("at most {most} pauses of a joint, {seconds} s"),

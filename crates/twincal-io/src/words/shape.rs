@@ -77,7 +77,7 @@ pub(super) fn sentences(assessment: &Assessment, calibration: &Calibration) -> V
             "{}: predicted probabilities are not evenly spread (off by {}, by chance below {}).",
             subject(&[own.subject.name()]),
             number(own.number("distance"), 2),
-            number(own.number("chance"), 2)
+            number(own.number("distance_limit"), 2)
         )
     }));
     out

@@ -30,6 +30,7 @@ mod decide;
 mod explanation;
 mod intervals;
 mod next;
+mod numbers;
 mod of_torque;
 mod rest;
 mod scores;
@@ -41,6 +42,7 @@ pub use claim::{Claim, Role, Subject};
 pub use decide::decide;
 pub use explanation::{Explanation, TensorElement, explanations};
 pub use next::{Request, RequestCode, open_effects};
+pub use numbers::NUMBERS;
 pub use rest::{AtRest, Pauses, all_at_rest, at_rest, few_pauses, standstill};
 pub use scores::{
     converged, decisive, friction_only, has_standstill, independent_rows, memory, rows_of,

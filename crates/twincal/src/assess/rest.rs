@@ -207,7 +207,12 @@ fn tested(calibration: &Calibration, together: &AtRest<'_>) -> Vec<Claim> {
         (false, _) => Claim::new(Code::TorqueErrorAtRest, subject, numbers),
     };
     let few = pauses.into_iter();
-    let few = few.flat_map(|own| [("pauses", own.most as f64), ("seconds", own.seconds)]);
+    let few = few.flat_map(|own| {
+        [
+            ("pauses", own.most as f64),
+            ("seconds_at_rest", own.seconds),
+        ]
+    });
     let mut out = Vec::new();
     if !worse.is_empty() || differs {
         out.push(claim.with(few));

@@ -155,7 +155,7 @@ fn single(calibration: &Calibration) -> impl Iterator<Item = &Reliability> {
 
 /// Distributions of all joints together, and of single joints, that are more than a little off.
 pub(super) fn claims(calibration: &Calibration) -> Vec<Claim> {
-    let numbers = |pit: &Pit| [("distance", pit.distance), ("chance", pit.chance)];
+    let numbers = |pit: &Pit| [("distance", pit.distance), ("distance_limit", pit.chance)];
     let mut out = Vec::new();
     if let Some(shape) = together(calibration) {
         let numbers = numbers(&calibration.validation.pit);
@@ -174,7 +174,7 @@ fn numbers_of(pit: &Pit, levels: &[(f64, f64)]) -> Vec<(&'static str, f64)> {
     let half = levels.iter().find(|(level, _)| *level == 0.5);
     let mut out = vec![
         ("distance", pit.distance),
-        ("chance", pit.chance),
+        ("distance_limit", pit.chance),
         ("slight", f64::from(u8::from(!is_far(pit)))),
         ("share_above", share_above(pit)),
     ];
