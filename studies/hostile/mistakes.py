@@ -6,8 +6,8 @@ Every mistake of `faults.py` on three robots x three motions x seeds; the seed a
 robots, motions and frictions in turn. Printed as Markdown, per mistake:
 
     found      the share of runs with a finding of the mistake's codes on the right log or joint (or an error that names it)
-    "Yes"      runs whose answer begins with "Yes" though a mistake stands that is not repaired: must be 0
-    "… yes"    runs whose answer says yes further behind ("While joints move, the torque yes, …")
+    "Yes"      runs whose answer is yes to predict torque though a mistake stands that is not repaired: must be 0
+    "… yes"    runs whose answer is yes with another limit ("Yes, within limits: torque while joints move, not its intervals, …")
     change ×   median of what the mistake changes: held-out error of the worst joint, or the payload's mass
 
 and for good studies findings of these codes per 100 (severity note left out). `--keep` stores every run and goes on from there.
@@ -127,13 +127,13 @@ def found(run):
 
 
 def said_yes(run):
-    """The answer begins with "Yes"."""
-    return run.headline.startswith("Yes")
+    """The answer is yes to predict torque, at most with exceptions or wide intervals."""
+    return re.match(r"Yes(, within limits:|,) (to predict torque|its intervals are wider)", run.headline) is not None
 
 
 def half_yes(run):
-    """The answer says yes further behind."""
-    return not said_yes(run) and re.search(r"\byes\b", run.headline.split(". ")[0]) is not None
+    """The answer is yes with another limit."""
+    return run.headline.startswith("Yes") and not said_yes(run)
 
 
 def alarms(run):

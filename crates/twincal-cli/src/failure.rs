@@ -66,6 +66,14 @@ impl Failure {
         })
     }
 
+    /// What is wrong; how to fix it.
+    #[must_use]
+    pub fn in_one_line(&self) -> String {
+        let (problem, remedy) = self.words();
+        let remedy = remedy.map_or_else(String::new, |remedy| format!("; {remedy}"));
+        problem + &remedy
+    }
+
     /// What is wrong, and how to fix it.
     #[must_use]
     pub fn words(&self) -> (String, Option<String>) {

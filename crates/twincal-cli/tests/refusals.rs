@@ -352,7 +352,11 @@ fn case_87_zero_residual_is_nothing_to_correct() {
     fs::write(folder.path().join("run.csv"), perfect).unwrap();
     let done = fit(folder.path(), &["-o", "out"]).expect(0);
     let answer = done.out.lines().next().unwrap();
-    assert!(answer.starts_with("Nothing to correct"), "{}", done.out);
+    assert!(
+        answer.starts_with("Yes, within limits: nothing to correct"),
+        "{}",
+        done.out
+    );
     let text = fs::read_to_string(folder.path().join("out/result.json")).unwrap();
     let result: serde_json::Value = serde_json::from_str(&text).unwrap();
     assert!(

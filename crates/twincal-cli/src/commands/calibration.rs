@@ -58,6 +58,7 @@ impl Done {
             format: self.format,
             instead: &[],
             behind: 0,
+            typed: None,
         }
     }
 

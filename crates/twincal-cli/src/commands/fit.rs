@@ -1,5 +1,6 @@
 //! `twincal fit`: from logs and a model to a calibrated twin.
 
+use super::brief::{Around, Typed};
 use super::calibration::{Job, Print, command, quoted, say_where, with_heldout};
 use super::inputs::{LogInput, Long, RobotInput};
 use super::open::open;
@@ -38,6 +39,11 @@ pub(super) fn run(flags: &Fit, terminal: &mut Terminal) -> Outcome<u8> {
     let (logs, heldout) = (read(given)?, read(&settings.log.heldout)?);
     every_log_once(&logs, &heldout)?;
     let command = command(model, given, &settings.log.heldout, &config.in_force());
+    let typed = Typed {
+        model,
+        logs: given,
+        heldout: &settings.log.heldout,
+    };
     let job = Job {
         maker: Maker::Fit,
         command,
@@ -51,7 +57,7 @@ pub(super) fn run(flags: &Fit, terminal: &mut Terminal) -> Outcome<u8> {
         watch,
     };
     let progress = (flags.print, progress);
-    finish(job, claim, progress, terminal)
+    finish((job, Some(typed)), claim, progress, terminal)
 }
 
 /// The logs of the command, or those of the config.
@@ -87,14 +93,18 @@ fn claimed(flags: &Fit, config: &Config, settings: &Settings, files: &[PathBuf])
 
 /// Runs the calibration, prints it and opens its report.
 fn finish(
-    job: Job<'_>,
+    (job, typed): (Job<'_>, Option<Typed<'_>>),
     claim: Claim,
     (flags, progress): (PrintFlags, Progress),
     terminal: &mut Terminal,
 ) -> Outcome<u8> {
     let (output, print) = (job.output, Print::of(flags, job.settings.json));
     let done = job.run(claim, Vec::new(), progress, terminal)?;
-    done.print(print, done.around(output), terminal)?;
+    let around = Around {
+        typed,
+        ..done.around(output)
+    };
+    done.print(print, around, terminal)?;
     say_where(output, print, terminal);
     if flags.open {
         open(&output.join(REPORT), terminal);
@@ -142,7 +152,7 @@ fn of_statistics(
         watch,
     };
     let progress = (flags.print, progress);
-    finish(job, claim, progress, terminal)
+    finish((job, None), claim, progress, terminal)
 }
 
 pub(super) fn fitted_and_held_out(name: &str) -> Failure {

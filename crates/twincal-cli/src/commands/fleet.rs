@@ -52,7 +52,7 @@ pub(super) fn run(flags: &Flags, terminal: &mut Terminal) -> Outcome<u8> {
     let of_type = (result.type_twin.as_ref()).map(|twin| twins::model_of_type(twin, model));
     let (file, refused) = match of_type.transpose() {
         Ok(file) => (file, None),
-        Err(failure) => (None, Some(failure.words().0)),
+        Err(failure) => (None, Some(failure.in_one_line())),
     };
     let about = fleet::Inputs {
         model: model.name.clone(),

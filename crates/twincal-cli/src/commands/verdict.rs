@@ -22,8 +22,8 @@ fn words(answer: &Answer) -> String {
     let reason = reasons.next().or(answer.grounds.first());
     let reason = reason.map_or("", String::as_str);
     let more = match answer.limits.len() + answer.folded.len() {
-        0 | 1 => String::new(),
-        n => format!(" ({} more in its report)", n - 1),
+        0 | 1 => "",
+        _ => " (more in its report)",
     };
     format!("can this twin be used? {} {reason}{more}", answer.lead)
 }
@@ -57,10 +57,10 @@ mod tests {
         assert_eq!(words(&not_tested), said);
         assert_eq!(
             told(
-                "Yes, to predict torque, with the exceptions:",
+                "Yes, within limits: to predict torque, with the exceptions:",
                 &["Joint a: one.", "Joint b: two."]
             ),
-            "can this twin be used? Yes, to predict torque, with the exceptions: Joint a: one. (1 more in its report)"
+            "can this twin be used? Yes, within limits: to predict torque, with the exceptions: Joint a: one. (more in its report)"
         );
     }
 }

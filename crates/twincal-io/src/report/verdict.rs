@@ -153,7 +153,7 @@ mod tests {
                     all.for_each(|t| (t.pip, t.status) = (Some(0.0), Status::Absent));
                 },
                 Grade::Care,
-                "Nothing to correct",
+                "nothing to correct",
             ),
         ];
         for (change, grade, words) in cases {
@@ -189,7 +189,7 @@ mod tests {
             })
             .headline
         };
-        assert!(of(2.0, 100).starts_with("While joints move, yes;"));
+        assert!(of(2.0, 100).starts_with("Yes, within limits: while joints move;"));
         assert!(of(0.5, 100).starts_with("Yes"));
         // Too few to say.
         assert!(of(9.0, 9).starts_with("Yes"));
@@ -272,12 +272,12 @@ mod tests {
     }
 
     #[test]
-    fn effects_that_are_all_tentative_are_no_more_than_perhaps() {
+    fn with_tentative_effects_alone_the_answer_is_not_yet() {
         let verdict = judged(|c| {
             let found = c.components.iter_mut().filter(|c| c.is_in());
             found.for_each(|c| c.status = Status::Tentative);
         });
-        assert!(verdict.headline.starts_with("Perhaps"), "{verdict:?}");
+        assert!(verdict.headline.starts_with("Not yet: "), "{verdict:?}");
         let said = "No effect is established.".to_owned();
         assert!(verdict.grounds.contains(&said));
     }
@@ -314,7 +314,8 @@ mod tests {
                 .iter()
                 .any(|l| l.ends_with(": a constant would do as well."))
         );
-        let large = "Better than the model alone, but the error that is left is large.";
+        let large =
+            "Yes, within limits: better than the model alone, but the error that is left is large.";
         assert_eq!(of(true, 0.98).headline, large);
         let one = of(false, 1.38);
         assert_ne!(one.grade, Grade::Bad);
@@ -342,7 +343,7 @@ mod tests {
         });
         assert_eq!(
             few.headline,
-            "Hard to say: the held-out rows count as too few independent ones to judge this twin by."
+            "Not yet: the held-out rows count as too few independent ones to judge this twin by."
         );
         assert_eq!(
             few.limits[0],
@@ -363,7 +364,7 @@ mod tests {
         assert_eq!(wide.grade, Grade::Care);
         assert_eq!(
             wide.headline,
-            "The torque yes; its intervals are wider than they need to be."
+            "Yes, within limits: torque; its intervals are wider than they need to be."
         );
         let said = "Joints shoulder and elbow: their intervals are wider than they need to be (on elbow 75.0\u{202f}% of the rows \
                     in 50 % intervals).";

@@ -342,15 +342,15 @@ type Change = fn(&mut Crafted);
 #[test]
 fn what_no_program_of_ours_wrote_is_refused() {
     assert_eq!(read(Crafted::new()).unwrap(), pendulum());
-    let changes: [(Change, &str); 7] = [
-        (
-            |own| own.metadata.format = 1,
-            "has format 1, this program reads 4; make it anew",
-        ),
-        (
-            |own| own.metadata.format = 5,
-            "has format 5, this program reads 4; read it with a newer",
-        ),
+    let ours = format!("this program reads {FORMAT}");
+    let older = format!("has format 1, {ours}; make it anew");
+    refused(Crafted::with(|own| own.metadata.format = 1), &older);
+    let newer = format!("has format {}, {ours}; read it with a newer", FORMAT + 1);
+    refused(
+        Crafted::with(|own| own.metadata.format = FORMAT + 1),
+        &newer,
+    );
+    let changes: [(Change, &str); 5] = [
         (
             |own| own.metadata.logs.clear(),
             "has 1 rows, its metadata name 0",

@@ -403,7 +403,7 @@ mod tests {
                 .for_each(|joint| joint.rmse_friction = Some(0.01));
         });
         assert!(
-            better.headline.starts_with("Hardly: friction"),
+            better.headline.starts_with("Not yet: friction"),
             "{better:?}"
         );
         assert!(

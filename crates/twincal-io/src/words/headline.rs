@@ -1,7 +1,7 @@
 //! The answer in one sentence.
 
 use super::grounds;
-use twincal::assess::{Assessment, has_standstill};
+use twincal::assess::{Answer, Assessment, has_standstill};
 use twincal::calibrate::Calibration;
 use twincal::{Code, Mistake, Severity};
 
@@ -14,106 +14,116 @@ pub(super) enum Exceptions {
     Behind,
 }
 
-/// The answer in one sentence, by what decides; of joints that move, and of torque that the filter lets pass.
+/// The answer in one sentence, by what decides; of joints that move, and of torque that the filter lets pass. It begins with the answer's own words.
 pub(super) fn headline(
     assessment: &Assessment,
     calibration: &Calibration,
     exceptions: Exceptions,
 ) -> String {
-    let reason = assessment.reason;
-    if reason == Code::TorqueCopied {
-        return "Not yet: the torque of one joint is that of another.".into();
+    let lead = lead(assessment.answer);
+    if let Some(words) = fixed(assessment.reason) {
+        return format!("{lead}: {words}");
     }
-    if let Some(mistake) = Mistake::of(reason, Severity::Degraded) {
-        return mistake_words(mistake).into();
+    let below = grounds::below_cutoff(calibration);
+    if assessment.reason == Code::Passed {
+        return format!(
+            "{lead}, to predict torque{below} on motions like the ones it was tested on."
+        );
     }
     let torque = match has_standstill(&calibration.validation) {
-        true => "While joints move, the torque yes",
-        false => "The torque yes",
+        true => "torque while joints move",
+        false => "torque",
     };
-    let predict = format!(
-        "Yes, to predict torque{}",
-        grounds::below_cutoff(calibration)
-    );
-    match reason {
+    let words = match assessment.reason {
         Code::NarrowIntervals | Code::DistributionNarrow => {
-            format!("{torque}, its intervals not: they are too narrow.")
+            format!("{torque}, not its intervals, which are too narrow.")
         }
         Code::DistributionWide => {
             format!("{torque}; its intervals are wider than they need to be.")
         }
         Code::TorqueAbovePrediction | Code::TorqueBelowPrediction => {
-            format!("{torque}, its intervals not: they lie off to one side.")
+            format!("{torque}, not its intervals, which lie off to one side.")
         }
-        Code::Passed => format!("{predict} on motions like the ones it was tested on."),
-        _ => match (fixed(reason), exceptions) {
-            (Some(words), _) => words.to_owned(),
-            (None, Exceptions::Below) => format!("{predict}, with the exceptions below."),
-            (None, Exceptions::Behind) => format!("{predict}, with the exceptions:"),
+        _ => match exceptions {
+            Exceptions::Below => format!("to predict torque{below}, with the exceptions below."),
+            Exceptions::Behind => format!("to predict torque{below}, with the exceptions:"),
         },
+    };
+    format!("{lead}: {words}")
+}
+
+/// The answer's own words.
+fn lead(answer: Answer) -> &'static str {
+    match answer {
+        Answer::Yes => "Yes",
+        Answer::YesWithinLimits => "Yes, within limits",
+        Answer::NotYet => "Not yet",
+        Answer::No => "No",
     }
 }
 
-/// Answers that are of the whole robot.
+/// What stands behind the answer where it is the same for every robot.
 fn fixed(reason: Code) -> Option<&'static str> {
+    if reason == Code::TorqueCopied {
+        return Some("the torque of one joint is that of another.");
+    }
+    if let Some(mistake) = Mistake::of(reason, Severity::Degraded) {
+        return Some(mistake_words(mistake));
+    }
     Some(match reason {
-        Code::NotTested => "Not yet: there are no held-out rows to judge this twin by.",
+        Code::NotTested => "there are no held-out rows to judge this twin by.",
         Code::FewHeldOutRows => {
-            "Hard to say: the held-out rows count as too few independent ones to judge this twin by."
+            "the held-out rows count as too few independent ones to judge this twin by."
         }
         Code::WorseThanNominal => {
-            "No: on held-out data the calibrated torque is worse than the nominal one."
+            "on held-out data the calibrated torque is worse than the nominal one."
         }
-        Code::ErrorAboveTorque => "No: the error left is larger than the torque itself.",
+        Code::ErrorAboveTorque => "the error left is larger than the torque itself.",
         Code::ErrorAboveTorqueOnMostJoints => {
-            "No: on most joints the error left is larger than the torque itself."
+            "on most joints the error left is larger than the torque itself."
         }
         Code::NothingFound => {
-            "Nothing to correct was found: none of the candidate effects is in this log."
+            "nothing to correct was found; none of the candidate effects is in this log."
         }
         Code::NoBetterThanNominal => {
-            "Hardly: on held-out data the calibrated torque is no better than the nominal one."
+            "on held-out data the calibrated torque is no better than the nominal one."
         }
         Code::FrictionAloneIsBetter => {
-            "Hardly: friction and an offset alone predict held-out torque better."
+            "friction and an offset alone predict held-out torque better."
         }
         Code::NothingEstablished => {
-            "Perhaps: low-passed torque is better with it, but none of its effects is established."
+            "low-passed torque is better with it, but none of its effects is established."
         }
-        Code::LargeError => "Better than the model alone, but the error that is left is large.",
+        Code::LargeError => "better than the model alone, but the error that is left is large.",
         Code::LargeErrorOnMostJoints => {
-            "Better than the model alone, but on most joints the error that is left is large."
+            "better than the model alone, but on most joints the error that is left is large."
         }
         Code::UnphysicalLinks => {
-            "With care: the inertia found of several links is physically inconsistent. Is this the robot's model?"
+            "the inertia found of several links is physically inconsistent. Is this the robot's model?"
         }
         Code::JointTorqueWorse => {
-            "With care: better than the model alone, but on some joints torque got worse."
+            "better than the model alone, but on some joints torque got worse."
         }
         Code::NarrowIntervalsInMotion => {
-            "While joints move the torque yes, its intervals not: they are too narrow."
+            "torque while joints move, not its intervals, which are too narrow."
         }
-        Code::WideIntervals => "Yes; its intervals are wider than they need to be.",
-        Code::WorseAtRest => "While joints move, yes; at standstill it is worse than your model.",
+        Code::WideIntervals => "its intervals are wider than they need to be.",
+        Code::WorseAtRest => "while joints move; at standstill it is worse than your model.",
         _ => return None,
     })
 }
 
-/// The headline where a mistake stands: never "Yes".
+/// What stands behind the answer where a mistake stands: it is "Not yet".
 fn mistake_words(mistake: Mistake) -> &'static str {
     match mistake {
         Mistake::Contradiction => {
-            "Not yet: log and model contradict each other in orientation, sign, scale or order of joints."
+            "log and model contradict each other in orientation, sign, scale or order of joints."
         }
-        Mistake::NoMeasurement => {
-            "Not yet: torque that never changes while joints move is no measurement."
-        }
-        Mistake::Copy => "Not yet: one log is a copy of another.",
-        Mistake::OddTorque => "Not yet: the torque of one log or joint contradicts the others.",
-        Mistake::OddMotion => "Not yet: positions or their clock are wrong in a log.",
-        Mistake::AnotherState => {
-            "Not yet: a held-out log is of another robot, or of another state of it."
-        }
+        Mistake::NoMeasurement => "torque that never changes while joints move is no measurement.",
+        Mistake::Copy => "one log is a copy of another.",
+        Mistake::OddTorque => "the torque of one log or joint contradicts the others.",
+        Mistake::OddMotion => "positions or their clock are wrong in a log.",
+        Mistake::AnotherState => "a held-out log is of another robot, or of another state of it.",
     }
 }
 

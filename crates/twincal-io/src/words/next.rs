@@ -8,7 +8,7 @@ use twincal::assess::{Assessment, Request, RequestCode};
 /// In one phrase, without its beginning; `None` where nothing is known that it would show.
 pub(super) fn next(assessment: &Assessment) -> Option<String> {
     if assessment.reason == Code::NotTested {
-        let words = "another motion, given with --heldout; or at least three logs to fit.";
+        let words = "another motion, given with --heldout.";
         return Some(words.into());
     }
     let holds = to_fit(&assessment.next);

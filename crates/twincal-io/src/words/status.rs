@@ -46,11 +46,19 @@ fn left_out(error: &LeftOutError) -> String {
     if error.is_clear() {
         format!("lowers the error of {data} by {size} ({sds} standard errors)")
     } else if error.lowered > 0.0 {
-        let needed = number(error.needed, 2);
+        let [sds, needed] = apart(error.standard_errors.abs(), error.needed);
         format!("lowers the error of {data} by {size}, {sds} standard errors ({needed} needed)")
     } else {
         format!("does not lower the error of {data}")
     }
+}
+
+/// Two numbers with two digits, or as many as show that they differ.
+fn apart(one: f64, other: f64) -> [String; 2] {
+    let shown = |digits| [one, other].map(|own| number(own, digits));
+    let differ = |own: &[String; 2]| own[0] != own[1];
+    let mut all = (2..=4).map(shown);
+    all.find(differ).unwrap_or_else(|| shown(4))
 }
 
 /// Names of the effects with this status that are likelier in than not.
@@ -88,6 +96,10 @@ mod tests {
         assert_eq!(
             of(error(0.008, 1.2)),
             "lowers the error of left-out logs by 0.8\u{202f}%, 1.2 standard errors (2.1 needed)"
+        );
+        assert_eq!(
+            of(error(0.008, 2.052)),
+            "lowers the error of left-out logs by 0.8\u{202f}%, 2.05 standard errors (2.06 needed)"
         );
         assert_eq!(
             of(error(-0.1, -3.0)),

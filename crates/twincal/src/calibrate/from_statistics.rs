@@ -111,6 +111,8 @@ fn road(
     } = &known;
     let (data, trajectories) = held_out_rows(statistics, library, heldout)?;
     findings.extend(compared(statistics, (heldout, &data))?);
+    // Logs of a fleet's robot are compared where that robot is fitted.
+    findings.extend(checked(statistics, &trajectories, pooled.is_none())?);
     progress(Stage::Inference)?;
     let fitted = match pooled {
         None => estimated((robot, sums, columns), &settings, findings)?,
@@ -125,8 +127,6 @@ fn road(
         fit,
     };
     findings.extend(data.findings.iter().cloned());
-    // Logs of a fleet's robot are compared where that robot is fitted.
-    findings.extend(checked(statistics, &trajectories, pooled.is_none())?);
     let plan = held_out::plan_of_heldout(&data, &trajectories);
     let (validation, more) = held_out::validate(own, library, plan, Vec::new(), progress)?;
     findings.extend(more);

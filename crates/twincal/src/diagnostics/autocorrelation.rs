@@ -60,7 +60,7 @@ fn lagged_product(x: &[f64], lag: usize) -> f64 {
 }
 
 /// Effective sample size of chains (not split any more): n chains × draws / τ, with Geyer's initial positive and
-/// monotone sequence over the chains' mean autocovariance. A constant chain counts in full.
+/// monotone sequence over the chains' mean autocovariance. A constant chain counts in full, and so does a single draw.
 pub(super) fn effective_samples<C: AsRef<[f64]>>(chains: &[C]) -> f64 {
     let count = chains.len() as f64;
     let draws = chains[0].as_ref().len();
@@ -68,7 +68,7 @@ pub(super) fn effective_samples<C: AsRef<[f64]>>(chains: &[C]) -> f64 {
     let all = || chains.iter().flat_map(|c| c.as_ref());
     let span = all().fold(f64::NEG_INFINITY, |a, &x| a.max(x))
         - all().fold(f64::INFINITY, |a, &x| a.min(x));
-    if span < CONSTANT {
+    if span < CONSTANT || draws < 2 {
         return count * length;
     }
     let means: Vec<f64> = chains

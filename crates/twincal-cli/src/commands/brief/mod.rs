@@ -11,8 +11,9 @@ pub(super) use effects::{unit, value};
 
 use super::calibration::{quoted, report_of};
 use crate::terminal::Terminal;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use text::{Page, Width, plain};
+use twincal::Code;
 use twincal::assess;
 use twincal::calibrate::Calibration;
 use twincal::validate::Split;
@@ -79,6 +80,41 @@ pub(in crate::commands) struct Around<'a> {
     pub(in crate::commands) instead: &'a [String],
     /// Lines that are printed behind the report's path.
     pub(in crate::commands) behind: usize,
+    /// What was fitted, where it was files of logs.
+    pub(in crate::commands) typed: Option<Typed<'a>>,
+}
+
+/// Paths as they were typed, so that commands with them run where this one did.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::commands) struct Typed<'a> {
+    pub(in crate::commands) model: &'a Path,
+    pub(in crate::commands) logs: &'a [PathBuf],
+    pub(in crate::commands) heldout: &'a [PathBuf],
+}
+
+/// Logs that a command names at most.
+const NAMED: usize = 6;
+
+impl Typed<'_> {
+    /// `twincal doctor …` of these logs.
+    fn doctor(self) -> String {
+        let logs = paths(self.logs.iter().chain(self.heldout));
+        let model = quoted(&self.model.to_string_lossy());
+        format!("twincal doctor {logs} --model {model}")
+    }
+
+    /// `twincal check …` of the held-out logs.
+    fn check(self, output: &str) -> String {
+        let logs = paths(self.heldout.iter());
+        format!("twincal check {logs} --twin {output}")
+    }
+}
+
+fn paths<'a>(all: impl Iterator<Item = &'a PathBuf>) -> String {
+    let words: Vec<String> = (all.take(NAMED))
+        .map(|path| quoted(&path.to_string_lossy()))
+        .collect();
+    words.join(" ")
 }
 
 /// Prints all but the last line, which is the report's path.
@@ -215,12 +251,22 @@ fn next(
             };
             format!("twincal export --twin {output} --to {format} -o {file}")
         }
-        assess::Answer::NotYet | assess::Answer::No => {
-            "twincal doctor LOG --model MODEL says what is wrong with a log or the model".into()
-        }
+        assess::Answer::NotYet | assess::Answer::No => doubted(answer, around.typed, &output),
     };
-    page.paragraph(&command, begin, width, 2);
+    page.paragraph(&command, begin, width, 3);
     page.blank();
+}
+
+/// The command that says more of a doubt.
+fn doubted(answer: &Answer, typed: Option<Typed<'_>>, output: &str) -> String {
+    let doctor = "says what is wrong with a log or the model";
+    match typed {
+        Some(typed) if answer.reason == Code::AnotherState => {
+            format!("{} says what may have changed", typed.check(output))
+        }
+        Some(typed) => format!("{} {doctor}", typed.doctor()),
+        None => format!("twincal doctor LOG --model MODEL {doctor}"),
+    }
 }
 
 #[cfg(test)]

@@ -131,7 +131,8 @@ fn answer() -> Answer {
     Answer {
         answer: twincal::assess::Answer::YesWithinLimits,
         reason: Code::JointIntervalsNarrow,
-        headline: "Yes, to predict torque below 5 Hz, with the exceptions below.".into(),
+        headline: "Yes, within limits: to predict torque below 5 Hz, with the exceptions below."
+            .into(),
         lead: String::new(),
         grounds: Vec::new(),
         limits: (0..3).map(limit).collect(),
@@ -146,6 +147,7 @@ fn printed(calibration: &Calibration, columns: usize) -> Vec<String> {
         format: "urdf",
         instead: &[],
         behind: 0,
+        typed: None,
     };
     let page = page(calibration, &answer(), around, columns);
     page.texts().into_iter().map(str::to_owned).collect()
