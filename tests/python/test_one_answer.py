@@ -79,6 +79,17 @@ def test_codes_page_has_every_number_of_every_claim(made):
         assert set(claim["evidence"]) <= known, claim
 
 
+def test_a_message_names_what_it_is_about_but_for_the_logs_of_some_codes(made):
+    page = (ROOT / "docs" / "codes.md").read_text()
+    without = set(re.findall(r"^### `(\w+)`\n(?:(?!### ).*\n)*?- Subject: the log, which", page, re.M))
+    assert "columns" in without
+    _, _, _, result = made
+    for finding in result["findings"]:
+        # of a set the first ones are named
+        named = finding["subject"].split(", ")[0] in finding["message"]
+        assert not finding["subject"] or named == (finding["code"] not in without), finding
+
+
 # Numbers that stand behind a message and not in it, or as "> 0.999" or "a segment".
 BESIDE = {
     ("short_segments", "segments"),

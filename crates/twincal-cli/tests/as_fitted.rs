@@ -137,7 +137,7 @@ fn usual_names_are_taken_and_told_where_the_log_has_those() {
     let (_, findings) = check("usual.csv", &[], 0);
     let told = said(&findings, "columns_not_as_fitted");
     assert!(
-        told[0].contains("usual.csv does not have the columns"),
+        told[0].contains("the log does not have the columns"),
         "{told:?}"
     );
     assert!(
@@ -193,8 +193,11 @@ fn a_factor_that_cannot_be_this_logs_is_doubted() {
     let (_, findings) = check("radians.csv", &[], 1);
     let doubts = said(&findings, "factor_in_doubt");
     assert_eq!(doubts.len(), 2, "{findings:?}");
+    let subjects = findings
+        .iter()
+        .filter(|own| own["code"] == "factor_in_doubt");
+    assert!(subjects.clone().all(|own| own["subject"] == "radians.csv"));
     for words in [
-        "radians.csv: ",
         "joint `elbow`",
         "0.017 of the 1.20",
         "q = { elbow = 1.0 }",

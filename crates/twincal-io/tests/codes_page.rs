@@ -49,6 +49,9 @@ fn section(code: Code) -> String {
         [] => line("Severity", "only claims have this code"),
         _ => line("Severity", &severities.join(", ")),
     }
+    if code.leaves_out_its_log() {
+        line("Subject", "the log, which the message does not name");
+    }
     let numbers: Vec<String> = (code.evidence().iter())
         .map(|name| format!("`{name}`"))
         .collect();

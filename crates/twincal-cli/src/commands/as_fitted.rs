@@ -129,10 +129,9 @@ impl<'a> AsFitted<'a> {
                 continue;
             }
             let message = format!(
-                "{}: with the factor {factor} of the fit joint `{joint}` moves over {} rad (m), {} of the {} that it moved \
+                "with the factor {factor} of the fit joint `{joint}` moves over {} rad (m), {} of the {} that it moved \
                  over in the fit; without it, {} of that. Where this log is in radians (m) already, say [columns.factor] q = {{ {} = 1.0 }}, \
                  and likewise qd and qdd, in a --config",
-                log.name(),
                 significant(range, 3),
                 significant(ratio, 2),
                 significant(fitted, 3),
@@ -143,10 +142,11 @@ impl<'a> AsFitted<'a> {
                 Finding::new(
                     Severity::Warning,
                     Code::FactorInDoubt,
-                    joint,
+                    log.name(),
                     message,
                     log.samples(),
                 )
+                .of_joint(joint)
                 .with([
                     ("factor", factor),
                     ("range", range),

@@ -287,8 +287,10 @@ impl LogInput {
         self.logs.push(log);
         self.findings
             .extend(findings.into_iter().map(|finding| Finding {
-                subject: finding.subject.replace(&given, name),
-                message: finding.message.replace(&given, name),
+                subject: match finding.subject.strip_prefix(&given) {
+                    Some(part) => name.to_owned() + part,
+                    None => finding.subject,
+                },
                 ..finding
             }));
     }

@@ -361,27 +361,20 @@ fn messages(findings: &[Finding], severity: Severity) -> Vec<Message<'_>> {
         messages.push(Message {
             code: finding.code,
             count: alike().count(),
-            text: format!("{}{}", about(&subjects, &finding.message), finding.message),
+            text: format!("{}{}", about(&subjects, finding.code), finding.message),
             subjects,
         });
     }
     messages
 }
 
-/// What a message is about, unless it says so itself.
-pub(super) fn about(subjects: &[&str], message: &str) -> String {
+/// What stands before a message: the logs that it is about, where it does not name them.
+pub(super) fn about(subjects: &[&str], code: Code) -> String {
+    if !code.leaves_out_its_log() {
+        return String::new();
+    }
     match subjects {
-        [] => String::new(),
-        [only] if only.is_empty() || message.contains(only) => String::new(),
-        // A message that begins with the same list of names, perhaps cut short.
-        [only]
-            if only
-                .split(", ")
-                .next()
-                .is_some_and(|name| message.starts_with(name)) =>
-        {
-            String::new()
-        }
+        [] | [""] => String::new(),
         [first, second, _, ..] => format!("{first}, {second} and {} more: ", subjects.len() - 2),
         few => format!("{}: ", few.join(", ")),
     }
@@ -469,9 +462,8 @@ mod tests {
         );
         let same = ["", "a", "b"].map(|joint| finding(joint, "same"));
         assert_eq!(told(&same), ["  warning: a, b: same"]);
-        let group = "a, b and 4 more are equivalent";
-        assert_eq!(about(&["a, b, c, d, e, f"], group), "");
-        assert_eq!(about(&["run1.csv"], group), "run1.csv: ");
+        assert_eq!(about(&["a, b, c, d, e, f"], Code::AlikeInData), "");
+        assert_eq!(about(&["run1.csv"], Code::Columns), "run1.csv: ");
     }
 
     #[test]

@@ -74,7 +74,7 @@ impl Attempt {
         if !self.given_up.is_empty() {
             let keys = self.given_up.join(", ");
             let message = format!(
-                "{log} does not have the columns that [columns] {keys} named in the fit: columns with the usual names are taken where \
+                "the log does not have the columns that [columns] {keys} named in the fit: columns with the usual names are taken where \
                  there are some; [columns] in a --config says otherwise"
             );
             say(Severity::Warning, Code::ColumnsNotAsFitted, message);

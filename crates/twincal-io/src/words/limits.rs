@@ -55,11 +55,8 @@ fn of_the_fit(assessment: &Assessment, calibration: &Calibration) -> Vec<String>
 
 /// The message of a finding, with the log that it is about where there are several.
 fn said(finding: &Finding, calibration: &Calibration) -> String {
-    let log = calibration
-        .logs
-        .iter()
-        .any(|log| log.name == finding.subject);
-    match log && calibration.logs.len() > 1 && !finding.message.contains(&finding.subject) {
+    let log = finding.code.leaves_out_its_log() && !finding.subject.is_empty();
+    match log && calibration.logs.len() > 1 {
         true => format!("{}: {}", finding.subject, finding.message),
         false => finding.message.clone(),
     }

@@ -36,8 +36,8 @@ pub enum Quantity {
     Still,
     /// Hashes of patterns in the noise of its torque, ascending: copies of a log have the same.
     Noise,
-    /// Some smoothed rows: position, velocity, acceleration, torque, whether the joint moves, what its friction can be; of the first joint,
-    /// their stamps and the first row of each stretch without a gap too.
+    /// Some smoothed rows: position, velocity, acceleration, torque, and what the joint's friction can be; of the first joint, their stamps
+    /// and the first row of each stretch without a gap too.
     Excerpt,
 }
 

@@ -251,7 +251,7 @@ fn of_states(joint: u32, states: &States) -> [Record; 4] {
 }
 
 /// Channels of an excerpt, and where each joint's stand; those of all joints stand behind them.
-const CHANNELS: usize = 6;
+const CHANNELS: usize = 5;
 
 fn of_excerpt(joint: u32, excerpt: &Excerpt) -> Vec<Record> {
     let places = if joint == 0 {

@@ -4,7 +4,7 @@ use crate::rigid_fit::{Bins, Zone};
 use crate::signal::{Pipeline, Segment, Trajectory};
 
 /// Rows of one log at most, and those below which it is not compared.
-const MOST: usize = 600;
+const MOST: usize = 300;
 const FEWEST: usize = 20;
 /// Rows of all logs about, and of each at least.
 const OF_ALL: usize = 12_000;
@@ -149,36 +149,46 @@ impl Excerpt {
         [self.time.clone(), starts.collect()]
     }
 
-    /// Position, velocity, acceleration and torque of a joint, whether it moves (0 or 1), and what its friction can be (0 to 3).
+    /// Position, velocity, acceleration and torque of a joint, and what its friction can be (0 to 3), with 4 more where it moves.
     #[must_use]
-    pub fn numbers(&self, joint: usize) -> [Vec<f64>; 6] {
+    pub fn numbers(&self, joint: usize) -> [Vec<f64>; CHANNELS + 1] {
         let Some(own) = self.joints.get(joint) else {
             return Default::default();
         };
         let [q, qd, qdd, tau] = (own.channels.each_ref())
             .map(|values| values.iter().map(|value| f64::from(*value)).collect());
-        let live = own.live.iter().map(|live| f64::from(u8::from(*live)));
-        let number = |zone| ZONES.iter().position(|own| own == zone);
-        let zones = own.zones.iter().filter_map(number).map(|zone| zone as f64);
-        [q, qd, qdd, tau, live.collect(), zones.collect()]
+        let states = own.zones.iter().zip(&own.live).filter_map(|(zone, live)| {
+            let number = ZONES.iter().position(|own| own == zone)?;
+            Some((number + ZONES.len() * usize::from(*live)) as f64)
+        });
+        [q, qd, qdd, tau, states.collect()]
     }
 
     /// From [`Excerpt::places`], and [`Excerpt::numbers`] of each joint; `None` if they are none of an excerpt.
     #[must_use]
-    pub fn of_numbers([time, starts]: [Vec<f64>; 2], joints: &[[Vec<f64>; 6]]) -> Option<Self> {
+    pub fn of_numbers(
+        [time, starts]: [Vec<f64>; 2],
+        joints: &[[Vec<f64>; CHANNELS + 1]],
+    ) -> Option<Self> {
         let rows = time.len();
         let begins = |row: &f64| row.fract() == 0.0 && (0.0..rows as f64).contains(row);
         let sound = starts.iter().all(begins)
             && starts.is_sorted_by(|one, next| one < next)
             && starts.is_empty() == time.is_empty()
             && joints.iter().flatten().all(|values| values.len() == rows);
-        let joint = |[q, qd, qdd, tau, live, zones]: &[Vec<f64>; 6]| {
+        let state = |number: &f64| {
+            let whole = (number.fract() == 0.0 && *number >= 0.0).then_some(*number as usize)?;
+            let live = whole >= ZONES.len();
+            Some((*ZONES.get(whole - ZONES.len() * usize::from(live))?, live))
+        };
+        let joint = |[q, qd, qdd, tau, states]: &[Vec<f64>; CHANNELS + 1]| {
             let short = |values: &Vec<f64>| values.iter().map(|value| *value as f32).collect();
-            let zones = zones.iter().map(|zone| ZONES.get(*zone as usize).copied());
+            let states: Option<Vec<(Zone, bool)>> = states.iter().map(state).collect();
+            let (zones, live) = states?.into_iter().unzip();
             Some(Joint {
                 channels: [q, qd, qdd, tau].map(short),
-                live: live.iter().map(|live| *live == 1.0).collect(),
-                zones: zones.collect::<Option<_>>()?,
+                live,
+                zones,
             })
         };
         let joints: Option<Vec<Joint>> = joints.iter().map(joint).collect();
@@ -223,8 +233,10 @@ mod tests {
             Some(excerpt.clone())
         );
         let mut other = numbers.clone();
-        other[1][5][7] = 4.0;
-        assert_eq!(Excerpt::of_numbers(places.clone(), &other), None);
+        for wrong in [8.0, 0.5, -1.0] {
+            other[1][4][7] = wrong;
+            assert_eq!(Excerpt::of_numbers(places.clone(), &other), None);
+        }
         let mut other = numbers.clone();
         other[0][2].pop();
         assert_eq!(Excerpt::of_numbers(places.clone(), &other), None);
@@ -232,7 +244,7 @@ mod tests {
             let [time, _] = places.clone();
             assert_eq!(Excerpt::of_numbers([time, starts], &numbers), None);
         }
-        assert_eq!(excerpt.among(20), excerpt);
+        assert_eq!(excerpt.among(40), excerpt);
         let few = excerpt.among(1000);
         assert!(few.len() <= LEAST, "{}", few.len());
         assert_eq!(
@@ -249,7 +261,7 @@ mod tests {
         gapped.segments.push(whole);
         let excerpt = Excerpt::of(&Pipeline::off(4), &gapped);
         assert_eq!(excerpt.starts(), [0, excerpt.len() / 2]);
-        let few = excerpt.among(300);
+        let few = excerpt.among(200);
         let [first, second] = *few.starts() else {
             panic!("{:?}", few.starts());
         };

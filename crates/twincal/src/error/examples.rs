@@ -44,7 +44,7 @@ examples! {
     ColumnFactor: "logged numbers are multiplied, as told: q of elbow -1";
     Columns: "time = t; elbow = q1 qd1 tau1 (no acceleration)";
     ColumnsAsFitted: "[columns] time, tau as in the fit; a key of [columns] in a --config says otherwise";
-    ColumnsNotAsFitted: "run3.csv does not have the columns that [columns] tau named in the fit: columns with the usual names are taken where there are some; [columns] in a --config says otherwise";
+    ColumnsNotAsFitted: "the log does not have the columns that [columns] tau named in the fit: columns with the usual names are taken where there are some; [columns] in a --config says otherwise";
     CommonFactor: "torque of all joints is 1.24 ± 0.02 times what the model with its found effects asks for, gravity and inertia alike (`drives.gain`): looks like another unit or gain of the torque columns, drive constants that are all off, or a model in other units of mass, length or time; check the drive constants and the clock, or give [columns.factor] tau = 0.806. It was fitted: other effects are those of the true torque if the model's own masses are right";
     CompactWorse: "the compact twin (effects with probability 0.5 or more alone) predicts held-out torque worse than the average over all models: RMSE 0.412 instead of 0.305 on moving joints; effects below 0.5 matter here: predict with the twin as it is, and do not read the compact one's numbers for the robot's";
     ConstantTorque: "torque never changes while the joint moves (joint `elbow` is 0 throughout): the drives were off, or the column was not recorded; what is found there is wrong unless it swung freely; map the measured torque in [columns] tau, or leave this log out";
@@ -72,7 +72,7 @@ examples! {
     EncoderStuck: "log `run3`, joint `elbow`: position holds one value from 12.300 to 12.410 s while the joint moves by 0.0412: repair the encoder or its log, and leave that time out";
     EqualityNotUsed: "equality <connect> `loop`: its forces are not part of the nominal torque (twincal works on trees); lock the joints that it holds";
     FactorAsFitted: "logged numbers are multiplied as in the fit: q of elbow by -1; [columns] factor of a --config says otherwise (1.0: as it is logged)";
-    FactorInDoubt: "run3.csv: with the factor 0.0174533 of the fit joint `elbow` moves over 0.0412 rad (m), 0.018 of the 2.31 that it moved over in the fit; without it, 1.0 of that. Where this log is in radians (m) already, say [columns.factor] q = { elbow = 1.0 }, and likewise qd and qdd, in a --config";
+    FactorInDoubt: "with the factor 0.0174533 of the fit joint `elbow` moves over 0.0412 rad (m), 0.018 of the 2.31 that it moved over in the fit; without it, 1.0 of that. Where this log is in radians (m) already, say [columns.factor] q = { elbow = 1.0 }, and likewise qd and qdd, in a --config";
     FewEffectiveRows: "the 4200 rows of joint `elbow` count as 6.2 independent rows, fewer than 10: what is found on it alone rests on little; log it longer and in faster motion";
     FlagNotUsed: "<flag spring=\"disable\"/> is a simulator's switch: joint springs stay in the nominal torque";
     FluidNotUsed: "<option> states a medium (density, viscosity): its drag is not part of the nominal torque";

@@ -23,7 +23,72 @@ macro_rules! table {
     };
 }
 
+/// Codes whose messages do not name the log that they are about.
+const WITHOUT_THEIR_LOG: &[Code] = &[
+    Code::Borders,
+    Code::Chapters,
+    Code::ChaptersLeftOut,
+    Code::ColumnFactor,
+    Code::Columns,
+    Code::ColumnsAsFitted,
+    Code::ColumnsNotAsFitted,
+    Code::ConstantTorque,
+    Code::Contact,
+    Code::ContradictingDuplicates,
+    Code::ControllerClock,
+    Code::CrowdedStamps,
+    Code::CutRow,
+    Code::DamagedChunks,
+    Code::DamagedData,
+    Code::DecimalComma,
+    Code::Delimiter,
+    Code::DrivesOff,
+    Code::DuplicateRows,
+    Code::EffortIsJointTorque,
+    Code::FactorInDoubt,
+    Code::Gaps,
+    Code::ImplausibleTimeStep,
+    Code::JointNotDriven,
+    Code::JointStandsStill,
+    Code::JointsLeftOut,
+    Code::LateMessages,
+    Code::LogTime,
+    Code::MissingTorque,
+    Code::ModelOrder,
+    Code::MotionFilterCapped,
+    Code::MotionSpike,
+    Code::NoMetadata,
+    Code::NotFiniteRows,
+    Code::PartsMerged,
+    Code::PositionStep,
+    Code::RepeatedSamples,
+    Code::Resampled,
+    Code::SaturatedTorque,
+    Code::ShortSegments,
+    Code::SlowerChannels,
+    Code::Standstill,
+    Code::TemperatureLeftOut,
+    Code::TemperatureMissing,
+    Code::TimeOrigin,
+    Code::TimeReplaced,
+    Code::TimeSource,
+    Code::TimeStepsBack,
+    Code::TimeUnit,
+    Code::TimestampType,
+    Code::TorqueSource,
+    Code::Truncated,
+    Code::UnreadableRows,
+    Code::VelocityMismatch,
+    Code::WrappedAngle,
+];
+
 impl Code {
+    /// True where messages of its findings leave out the log that they are about: it is their subject, and stands before them where there are several.
+    #[must_use]
+    pub fn leaves_out_its_log(self) -> bool {
+        WITHOUT_THEIR_LOG.contains(&self)
+    }
+
     /// Numbers that a finding of a long log has beside its own: the chapter that it is worst in, of how many, and in how many more it was found.
     pub const EVIDENCE_OF_CHAPTERS: &[&str] = &["chapter", "chapters", "chapters_alike"];
 

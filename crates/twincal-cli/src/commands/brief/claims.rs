@@ -56,7 +56,7 @@ fn claims(calibration: &Calibration, answer: &Answer) -> (Vec<String>, usize) {
         }
         all += 1;
         if !before.iter().any(|own| own.code == finding.code) {
-            let subject = about(&[finding.subject.as_str()], &finding.message);
+            let subject = about(&[finding.subject.as_str()], finding.code);
             texts.push(format!("{subject}{}", finding.message));
         }
     }

@@ -127,7 +127,7 @@ fn of_finding(finding: &Finding, examination: &Examination) -> Advice {
     let doubtful = usize::from(finding.severity < Severity::Degraded);
     let place = known.map_or(LAST, |(place, _)| place);
     Advice {
-        problem: about(&[finding.subject.as_str()], &finding.message) + &finding.message,
+        problem: about(&[finding.subject.as_str()], finding.code) + &finding.message,
         how,
         wrong: true,
         when,

@@ -225,7 +225,7 @@ fn unfold(
                 ),
                 jumps,
             );
-            return Some((finding, None));
+            return Some((finding.of_joint(name), None));
         }
         let mut all = logged.to_vec();
         for (row, value) in runs.iter().flat_map(|run| run.rows.iter()).zip(q) {

@@ -109,6 +109,7 @@ impl Saturated {
                 ),
                 flat.samples,
             )
+            .of_joint(&flat.name)
             .with([
                 ("level", flat.level), ("times", flat.spans.len() as f64),
                 ("share_left_out", masked as f64 / all.max(1) as f64),

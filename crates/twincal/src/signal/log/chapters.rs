@@ -154,8 +154,8 @@ pub(crate) fn told_once(said: Vec<(usize, Finding)>, chapters: usize) -> Vec<Fin
     for (chapter, finding) in said {
         let alike = |group: &&mut Vec<(usize, Finding)>| {
             let first = &group[0].1;
-            (&first.code, &first.subject) == (&finding.code, &finding.subject)
-                && named(&first.message) == named(&finding.message)
+            let thing = |own: &Finding| (own.code, own.subject.clone(), own.joint.clone());
+            thing(first) == thing(&finding)
         };
         match groups.iter_mut().find(alike) {
             Some(group) => group.push((chapter, finding)),
@@ -192,11 +192,6 @@ pub(crate) fn told_once(said: Vec<(usize, Finding)>, chapters: usize) -> Vec<Fin
         .collect()
 }
 
-/// The first name in a message: what comes in backquotes.
-fn named(message: &str) -> Option<&str> {
-    message.split('`').nth(1)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -211,6 +206,7 @@ mod tests {
                 format!("joint `{joint}` rests {count}"),
                 count,
             )
+            .of_joint(joint)
         };
         let said = vec![
             (0, finding(Severity::Note, "elbow", 10)),

@@ -149,6 +149,7 @@ pub(crate) fn unfolded(log: &str, joint: &str, jumps: u64) -> Finding {
         format!("joint `{joint}`: {jumps} jumps by a full turn, unfolded"),
         jumps,
     )
+    .of_joint(joint)
 }
 
 /// Unfolds an angle in place and returns the number of jumps.

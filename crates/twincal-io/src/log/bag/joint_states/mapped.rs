@@ -37,15 +37,16 @@ impl JointStates<'_> {
         let topic = &self.topics[known];
         let joint_states = kind.is_some_and(|kind| KINDS.contains(&kind));
         let read = topic.mapped.is_some() || topic.read_as.is_some() || joint_states;
+        let alike = topic.kind.as_deref() == kind;
         // Joint states need no schema: their definition is known.
         let unnamed = kind.is_none() && topic.mapped.is_none();
-        let same = (topic.kind.as_deref() == kind || unnamed) && topic.encoding == encoding;
+        let same = (alike || unnamed) && topic.encoding == encoding;
         if !read || same {
             return Ok(());
         }
         let words = |kind: Option<&str>, encoding: &str| {
             let kind = kind.unwrap_or("no schema");
-            match topic.kind.as_deref() == Some(kind) {
+            match alike {
                 true => format!("{kind} ({encoding})"),
                 false => kind.to_owned(),
             }
