@@ -6,8 +6,8 @@ Every mistake of `faults.py` on three robots x three motions x seeds; the seed a
 robots, motions and frictions in turn. Printed as Markdown, per mistake:
 
     found      the share of runs with a finding of the mistake's codes on the right log or joint (or an error that names it)
-    "Yes"      runs whose answer is yes to predict torque though a mistake stands that is not repaired: must be 0
-    "… yes"    runs whose answer is yes with another limit ("Yes, within limits: torque while joints move, not its intervals, …")
+    "Yes"      runs whose answer is yes, at most with exceptions, though a mistake stands that is not repaired: must be 0
+    "… yes"    runs whose answer is yes but for the intervals or for standstill
     change ×   median of what the mistake changes: held-out error of the worst joint, or the payload's mass
 
 and for good studies findings of these codes per 100 (severity note left out). `--keep` stores every run and goes on from there.
@@ -55,6 +55,8 @@ class Run:
     rows: int = 0  # of training, over all joints
     truth: dict = None  # of the training logs: repeats, contact
     rest: list = None  # share of training rows masked at rest, and the share of samples truly at rest
+    answer: str = None  # assessment.answer and its reason
+    reason: str = None
 
     @property
     def key(self):
@@ -106,7 +108,8 @@ def one(program, fault, robot, motion, seed):
     truth = {key: [log.truth.get(key) for log in study.train] for key in ("repeats", "missing", "contact")}
     return Run(fault, robot, motion, seed, code, headline(out), "" if result else error[max(error.find("error:"), 0) :].strip()[:2000],
                findings, rmse, round(seconds, 2), study.truth.get("log") or "", "" if joint is None else Arm(world).names[joint],
-               sorted(c["name"] for c in components if c["status"] == "established"), masses[0] if masses else None, rows, truth, rest)  # fmt: skip
+               sorted(c["name"] for c in components if c["status"] == "established"), masses[0] if masses else None, rows, truth, rest,
+               *((result or {}).get("assessment", {}).get(key) for key in ("answer", "reason")))  # fmt: skip
 
 
 def names_it(run, text):
@@ -126,14 +129,20 @@ def found(run):
     return bool(run.error and fault.error and re.search(fault.error, run.error) and names_it(run, run.error))
 
 
+# Reasons of `yes_within_limits` that take back the intervals or standstill, and those that say little for the twin.
+HALF = ["narrow_intervals", "narrow_intervals_in_motion", "worse_at_rest", "distribution_wide", "distribution_narrow"]
+HALF += ["torque_above_prediction", "torque_below_prediction"]
+POOR = ["nothing_found", "large_error", "large_error_on_most_joints", "unphysical_links", "joint_torque_worse"]
+
+
 def said_yes(run):
-    """The answer is yes to predict torque, at most with exceptions or wide intervals."""
-    return re.match(r"Yes(, within limits:|,) (to predict torque|its intervals are wider)", run.headline) is not None
+    """The answer is yes, at most with exceptions on single joints or with intervals that are too wide."""
+    return run.answer in ("yes", "yes_within_limits") and run.reason not in HALF + POOR
 
 
 def half_yes(run):
-    """The answer is yes with another limit."""
-    return run.headline.startswith("Yes") and not said_yes(run)
+    """The answer is yes, but for the intervals or for standstill."""
+    return run.answer == "yes_within_limits" and run.reason in HALF
 
 
 def alarms(run):
@@ -191,7 +200,9 @@ def read_kept(path):
     if path is None or not path.exists():
         return {}
     fields = Run.__dataclass_fields__
-    rows = [Run(**{key: value for key, value in json.loads(line).items() if key in fields}) for line in path.read_text().splitlines() if line.strip()]
+    lines = [json.loads(line) for line in path.read_text().splitlines() if line.strip()]
+    # Runs of before answers were kept are made again.
+    rows = [Run(**{key: value for key, value in line.items() if key in fields}) for line in lines if "answer" in line]
     return {row.key: row for row in rows}
 
 

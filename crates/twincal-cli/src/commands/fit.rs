@@ -57,7 +57,10 @@ pub(super) fn run(flags: &Fit, terminal: &mut Terminal) -> Outcome<u8> {
         watch,
     };
     let progress = (flags.print, progress);
-    finish((job, Some(typed)), claim, progress, terminal)
+    // With a config or a flag beside the paths another command says something else.
+    let plain = flags.log.config.is_none() && flags.log.rate.is_none() && !flags.log.lenient;
+    let typed = (plain && !flags.logs.is_empty()).then_some(typed);
+    finish((job, typed), claim, progress, terminal)
 }
 
 /// The logs of the command, or those of the config.

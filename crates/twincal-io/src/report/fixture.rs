@@ -346,7 +346,7 @@ fn findings(names: &[&str]) -> Vec<Finding> {
     vec![
         Finding::new(
             Severity::Warning,
-            Code::JointNotDriven,
+            Code::JointNotExcited,
             names[names.len() - 1],
             format!(
                 "joint `{}`: at rest in 9.3 % of the rows (|q̇| < 0.02 rad/s); its friction is known less well than the \
@@ -359,7 +359,7 @@ fn findings(names: &[&str]) -> Vec<Finding> {
             Severity::Note,
             Code::TimeOrigin,
             "run0.csv",
-            "log `run0.csv`: 3 stamps repeated; the later ones were dropped.",
+            "3 stamps repeated; the later ones were dropped.",
             3,
         ),
     ]

@@ -167,7 +167,11 @@ mod tests {
     fn no_yes_stands_beside_a_mistake() {
         assert!(judged(|_| ()).headline.starts_with("Yes"));
         for (code, severity) in Mistake::codes() {
-            let finding = Finding::new(severity, code, "elbow", "elbow: wrong", 1);
+            let message = match code.leaves_out_its_log() {
+                true => "wrong",
+                false => "elbow: wrong",
+            };
+            let finding = Finding::new(severity, code, "elbow", message, 1);
             let said = judged(|c| c.findings = vec![finding.clone()]);
             assert!(said.headline.starts_with("Not yet"), "{code}: {said:?}");
             assert_eq!((said.grade, &said.next), (Grade::Bad, &None), "{code}");
@@ -189,7 +193,7 @@ mod tests {
             })
             .headline
         };
-        assert!(of(2.0, 100).starts_with("Yes, within limits: while joints move;"));
+        assert!(of(2.0, 100).starts_with("Yes, within limits: use it while joints move;"));
         assert!(of(0.5, 100).starts_with("Yes"));
         // Too few to say.
         assert!(of(9.0, 9).starts_with("Yes"));
@@ -364,7 +368,7 @@ mod tests {
         assert_eq!(wide.grade, Grade::Care);
         assert_eq!(
             wide.headline,
-            "Yes, within limits: torque; its intervals are wider than they need to be."
+            "Yes, within limits: use its torque; its intervals are wider than they need to be."
         );
         let said = "Joints shoulder and elbow: their intervals are wider than they need to be (on elbow 75.0\u{202f}% of the rows \
                     in 50 % intervals).";

@@ -31,8 +31,8 @@ pub(super) fn headline(
         );
     }
     let torque = match has_standstill(&calibration.validation) {
-        true => "torque while joints move",
-        false => "torque",
+        true => "use its torque while joints move",
+        false => "use its torque",
     };
     let words = match assessment.reason {
         Code::NarrowIntervals | Code::DistributionNarrow => {
@@ -42,7 +42,7 @@ pub(super) fn headline(
             format!("{torque}; its intervals are wider than they need to be.")
         }
         Code::TorqueAbovePrediction | Code::TorqueBelowPrediction => {
-            format!("{torque}, not its intervals, which lie off to one side.")
+            format!("{torque}, not its intervals, which are biased.")
         }
         _ => match exceptions {
             Exceptions::Below => format!("to predict torque{below}, with the exceptions below."),
@@ -105,10 +105,10 @@ fn fixed(reason: Code) -> Option<&'static str> {
             "better than the model alone, but on some joints torque got worse."
         }
         Code::NarrowIntervalsInMotion => {
-            "torque while joints move, not its intervals, which are too narrow."
+            "use its torque while joints move, not its intervals, which are too narrow."
         }
         Code::WideIntervals => "its intervals are wider than they need to be.",
-        Code::WorseAtRest => "while joints move; at standstill it is worse than your model.",
+        Code::WorseAtRest => "use it while joints move; at standstill it is worse than your model.",
         _ => return None,
     })
 }

@@ -145,9 +145,27 @@ pub(crate) mod tests {
 
     /// What is said of it, nothing folded away.
     pub(crate) fn judged(change: impl Fn(&mut Calibration)) -> Answer {
-        let mut answer = answer(&changed(change));
+        let calibration = changed(change);
+        require_known_numbers(&calibration);
+        let mut answer = answer(&calibration);
         answer.limits.append(&mut answer.folded);
         answer
+    }
+
+    /// Every number of a claim stands at its code.
+    fn require_known_numbers(calibration: &Calibration) {
+        for claim in assess(calibration).claims {
+            let of_claims = claim.code.evidence_of_claims();
+            let known = |name: &str| {
+                let names = [of_claims, claim.code.evidence(), &["count"]].concat();
+                names.contains(&name)
+            };
+            let unknown: Vec<&str> = (claim.evidence.iter())
+                .map(|(name, _)| name)
+                .filter(|name| !known(name))
+                .collect();
+            assert_eq!(unknown, [""; 0], "{}", claim.code);
+        }
     }
 
     /// PIT with this many of 20 bins' share inside the middle ten, and a slope.

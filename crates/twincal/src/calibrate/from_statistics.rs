@@ -111,8 +111,7 @@ fn road(
     } = &known;
     let (data, trajectories) = held_out_rows(statistics, library, heldout)?;
     findings.extend(compared(statistics, (heldout, &data))?);
-    // Logs of a fleet's robot are compared where that robot is fitted.
-    findings.extend(checked(statistics, &trajectories, pooled.is_none())?);
+    findings.extend(checked(statistics, &trajectories)?);
     progress(Stage::Inference)?;
     let fitted = match pooled {
         None => estimated((robot, sums, columns), &settings, findings)?,
@@ -358,17 +357,10 @@ fn compared(statistics: &Statistics, (heldout, data): (&Logs<'_>, &Data)) -> Res
     Ok(findings)
 }
 
-/// What motion and model say of the held-out logs, and, `with_others`, torque of a log or a joint that the others contradict.
-fn checked(
-    statistics: &Statistics,
-    trajectories: &all_logs::Trajectories,
-    with_others: bool,
-) -> Result<Vec<Finding>> {
+/// What motion and model say of the held-out logs, and torque of a log or a joint that the others contradict.
+fn checked(statistics: &Statistics, trajectories: &all_logs::Trajectories) -> Result<Vec<Finding>> {
     let (robot, pipeline) = (&statistics.robot, &statistics.plan.pipeline);
     let checked = self_check(robot, pipeline, trajectories.heldout.iter())?;
-    if !with_others {
-        return Ok(checked);
-    }
     let fitted = statistics.logs.iter().map(|log| Compared {
         name: log.name(),
         payload: log.about.facts.payload,

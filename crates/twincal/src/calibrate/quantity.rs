@@ -37,7 +37,7 @@ pub enum Quantity {
     /// Hashes of patterns in the noise of its torque, ascending: copies of a log have the same.
     Noise,
     /// Some smoothed rows: position, velocity, acceleration, torque, and what the joint's friction can be; of the first joint, their stamps
-    /// and the first row of each stretch without a gap too.
+    /// too.
     Excerpt,
 }
 

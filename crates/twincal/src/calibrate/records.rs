@@ -250,16 +250,12 @@ fn of_states(joint: u32, states: &States) -> [Record; 4] {
     })
 }
 
-/// Channels of an excerpt, and where each joint's stand; those of all joints stand behind them.
+/// Lists of an excerpt for each joint; that of the stamps stands behind those of the first one.
 const CHANNELS: usize = 5;
 
 fn of_excerpt(joint: u32, excerpt: &Excerpt) -> Vec<Record> {
-    let places = if joint == 0 {
-        excerpt.places().to_vec()
-    } else {
-        Vec::new()
-    };
-    let lists = excerpt.numbers(joint as usize).into_iter().chain(places);
+    let stamps = (joint == 0).then(|| excerpt.stamps().to_vec());
+    let lists = excerpt.numbers(joint as usize).into_iter().chain(stamps);
     let record = |(block, values)| Record {
         joint,
         quantity: Quantity::Excerpt,
@@ -410,7 +406,7 @@ impl Taken<'_> {
         let mut list = |joint, place| -> Result<Vec<f64>> {
             Ok(self.take(joint, Quantity::Excerpt, place)?.values)
         };
-        let places = [list(0, CHANNELS)?, list(0, CHANNELS + 1)?];
+        let stamps = list(0, CHANNELS)?;
         let of_joint = |joint| -> Result<[Vec<f64>; CHANNELS]> {
             let mut numbers: [Vec<f64>; CHANNELS] = Default::default();
             for (place, values) in numbers.iter_mut().enumerate() {
@@ -419,7 +415,7 @@ impl Taken<'_> {
             Ok(numbers)
         };
         let numbers = (0..joints).map(of_joint).collect::<Result<Vec<_>>>()?;
-        let excerpt = Excerpt::of_numbers(places, &numbers);
+        let excerpt = Excerpt::of_numbers(stamps, &numbers);
         excerpt.ok_or_else(|| self.damaged("has an excerpt of rows that is none"))
     }
 

@@ -11,6 +11,7 @@
 use super::rows::{Block, FRICTION};
 use crate::linear_algebra::{Cholesky, dot};
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 /// Share of its own size by which a parameter is held at the model's: directions that no motion shows stay there.
 const RIDGE: f64 = 1e-6;
@@ -190,13 +191,18 @@ impl CommonFit {
         left / all
     }
 
-    /// One more column, cheaply: without an sd.
-    pub(super) fn effect(&self, column: impl Fn(Fitted<'_>) -> Option<Vec<f64>>) -> Option<Effect> {
-        let (columns, right) = self.column(column);
+    /// One more column, cheaply: without an sd. It is 0 in other logs than this one, where one is named.
+    pub(super) fn effect(
+        &self,
+        log: Option<usize>,
+        column: impl Fn(Fitted<'_>) -> Option<Vec<f64>>,
+    ) -> Option<Effect> {
+        let own = self.rows_of(log);
+        let (columns, right) = self.column(own.clone(), column);
         let mut solution = right.clone();
         self.matrix.solve(&mut solution);
         let (mut square, mut product, mut left) = (-dot(&right, &solution), 0.0, 0.0);
-        for (own, column) in self.rows.iter().zip(&columns) {
+        for (own, column) in self.rows[own].iter().zip(&columns) {
             let Some(column) = column else { continue };
             square += dot(column, column);
             product += dot(column, &own.residual);
@@ -213,18 +219,25 @@ impl CommonFit {
         })
     }
 
-    /// One more column, with the sd of its coefficient.
-    pub(super) fn judged(&self, column: impl Fn(Fitted<'_>) -> Option<Vec<f64>>) -> Option<Effect> {
-        let effect = self.effect(&column)?;
-        let (columns, mut solution) = self.column(column);
+    /// One more column, with the sd of its coefficient; see [`CommonFit::effect`].
+    pub(super) fn judged(
+        &self,
+        log: Option<usize>,
+        column: impl Fn(Fitted<'_>) -> Option<Vec<f64>>,
+    ) -> Option<Effect> {
+        let effect = self.effect(log, &column)?;
+        let range = self.rows_of(log);
+        let (columns, mut solution) = self.column(range.clone(), column);
         self.matrix.solve(&mut solution);
         // r = R c̃, the residual without it, and their products by log and second.
         let (mut square, mut sums) = (0.0, BTreeMap::<(usize, i64), f64>::new());
-        for (own, column) in self.rows.iter().zip(&columns) {
+        for (number, own) in self.rows.iter().enumerate() {
+            let column = number.checked_sub(range.start);
+            let column = column.and_then(|at| columns.get(at)?.as_ref());
             let mut r = own.times(&solution);
             own.project(&mut r);
             for (i, r) in r.iter_mut().enumerate() {
-                *r = column.as_ref().map_or(0.0, |column| column[i]) - own.weight * *r;
+                *r = column.map_or(0.0, |column| column[i]) - own.weight * *r;
             }
             if let Some(column) = column {
                 square += dot(&r, column);
@@ -243,13 +256,23 @@ impl CommonFit {
         })
     }
 
-    /// Columns off friction times their weight, and their products with the regressor.
+    /// Where the rows of a log stand, or all of them.
+    fn rows_of(&self, log: Option<usize>) -> Range<usize> {
+        let before = |log: usize| self.rows.partition_point(|own| own.block.log < log);
+        match log {
+            Some(log) => before(log)..before(log + 1),
+            None => 0..self.rows.len(),
+        }
+    }
+
+    /// Columns of these rows off friction times their weight, and their products with the regressor.
     fn column(
         &self,
+        rows: Range<usize>,
         column: impl Fn(Fitted<'_>) -> Option<Vec<f64>>,
     ) -> (Vec<Option<Vec<f64>>>, Vec<f64>) {
         let mut right = vec![0.0; self.size];
-        let columns = self.rows.iter().map(|own| {
+        let columns = self.rows[rows].iter().map(|own| {
             let mut values = column(Fitted(own))?;
             own.project(&mut values);
             values.iter_mut().for_each(|v| *v *= own.weight);

@@ -3,14 +3,19 @@
 use crate::rigid_fit::{Bins, Zone};
 use crate::signal::{Pipeline, Segment, Trajectory};
 
-/// Rows of one log at most, and those below which it is not compared.
-const MOST: usize = 300;
+/// Places of one log at most, at each of which three neighbouring rows are kept: their differences are rates, however long the log is.
+const MOST: usize = 100;
+const TRIPLE: usize = 3;
+/// Places of all logs about, and of each at least.
+const OF_ALL: usize = 4_000;
+const LEAST: usize = 16;
+/// Rows below which a log is not compared.
 const FEWEST: usize = 20;
-/// Rows of all logs about, and of each at least.
-const OF_ALL: usize = 12_000;
-const LEAST: usize = 40;
-/// Width of the moving average in periods of the cut-off.
+/// Width of the moving average in periods of the cut-off, and the part of it by which neighbours are apart.
 const WINDOW: f64 = 0.5;
+const APART: f64 = 0.25;
+/// That distance without a filter, s.
+const UNFILTERED: f64 = 0.02;
 /// In the order of their numbers.
 const ZONES: [Zone; 4] = [Zone::Slides, Zone::Reverses, Zone::Rests, Zone::Unknown];
 /// Position, velocity, acceleration, torque.
@@ -21,7 +26,7 @@ const CHANNELS: usize = 4;
 pub struct Excerpt {
     /// s.
     time: Vec<f64>,
-    /// First row of each stretch without a gap.
+    /// First row of each place.
     starts: Vec<usize>,
     joints: Vec<Joint>,
 }
@@ -49,39 +54,51 @@ impl Excerpt {
             joints: vec![Joint::default(); trajectory.dof],
             ..Self::default()
         };
+        let step = total.div_ceil(MOST);
+        let mut seen: usize = 0;
         for segment in &trajectory.segments {
-            rows.append(pipeline, segment, total.div_ceil(MOST));
+            // Evenly over the log, however it is cut.
+            let first = seen.next_multiple_of(step) - seen;
+            rows.append(pipeline, segment, (first, step));
+            seen += segment.time.len();
         }
         rows
     }
 
-    fn append(&mut self, pipeline: &Pipeline, segment: &Segment, step: usize) {
+    fn append(&mut self, pipeline: &Pipeline, segment: &Segment, (first, step): (usize, usize)) {
         let len = segment.time.len();
-        let half = if pipeline.is_off() {
-            0
-        } else {
-            (0.5 * WINDOW / pipeline.cutoff_hz / segment.interval).round() as usize
+        let rows_of = |seconds: f64| (seconds / segment.interval).round() as usize;
+        let (half, apart) = match pipeline.is_off() {
+            true => (0, rows_of(UNFILTERED)),
+            false => {
+                let window = WINDOW / pipeline.cutoff_hz;
+                (rows_of(0.5 * window), rows_of(APART * window))
+            }
         };
-        let centres = || (half..len.saturating_sub(half)).step_by(step);
-        if centres().next().is_some() {
-            self.starts.push(self.time.len());
-        }
-        self.time.extend(centres().map(|i| segment.time[i]));
+        let apart = apart.max(1);
+        let step = step.max(TRIPLE * apart);
+        let reach = half + apart;
+        let places = (first..len).step_by(step);
+        let places = places.filter(|i| *i >= reach && i + reach < len);
+        let centres: Vec<usize> = places.flat_map(|i| [i - apart, i, i + apart]).collect();
+        let starts = self.time.len()..self.time.len() + centres.len();
+        self.starts.extend(starts.step_by(TRIPLE));
+        self.time.extend(centres.iter().map(|i| segment.time[*i]));
         let from = [&segment.q, &segment.qd, &segment.qdd, &segment.tau];
         for (joint, rows) in self.joints.iter_mut().enumerate() {
             let own = joint * len..(joint + 1) * len;
             for (to, from) in rows.channels.iter_mut().zip(from) {
                 let values = &from[own.clone()];
-                let mean = |i: usize| {
+                let mean = |i: &usize| {
                     let window = &values[i - half..=i + half];
                     (window.iter().sum::<f64>() / window.len() as f64) as f32
                 };
-                to.extend(centres().map(mean));
+                to.extend(centres.iter().map(mean));
             }
             let still = &segment.standstill[own];
-            rows.live.extend(centres().map(|i| !still[i]));
-            let zone = |i: usize| Zone::at(segment, joint, &(i - half..i + half + 1));
-            rows.zones.extend(centres().map(zone));
+            rows.live.extend(centres.iter().map(|i| !still[*i]));
+            let zone = |i: &usize| Zone::at((pipeline, segment), joint, &(i - half..i + half + 1));
+            rows.zones.extend(centres.iter().map(zone));
         }
     }
 
@@ -121,32 +138,28 @@ impl Excerpt {
         Bins::of_rows(&self.time, &self.motion(), zones.collect())
     }
 
-    /// As many rows as a comparison of so many logs takes of each.
+    /// As many rows as a comparison of so many logs takes of each, evenly taken.
     #[must_use]
     pub fn among(&self, logs: usize) -> Self {
-        let most = (OF_ALL / logs.max(1)).clamp(LEAST, MOST);
-        let step = self.time.len().div_ceil(most).max(1);
-        let mut starts: Vec<usize> = self.starts.iter().map(|row| row.div_ceil(step)).collect();
-        starts.dedup();
-        let kept = |own: &Joint| Joint {
-            channels: own.channels.each_ref().map(|values| every(step, values)),
-            live: every(step, &own.live),
-            zones: every(step, &own.zones),
+        let (places, most) = (self.starts.len(), (OF_ALL / logs.max(1)).clamp(LEAST, MOST));
+        let kept = places.min(most);
+        let kept: Vec<usize> = (0..kept).map(|i| i * places / kept).collect();
+        let of_joint = |own: &Joint| Joint {
+            channels: own.channels.each_ref().map(|values| triples(&kept, values)),
+            live: triples(&kept, &own.live),
+            zones: triples(&kept, &own.zones),
         };
-        let time = every(step, &self.time);
-        starts.retain(|row| *row < time.len());
         Self {
-            time,
-            starts,
-            joints: self.joints.iter().map(kept).collect(),
+            time: triples(&kept, &self.time),
+            starts: (0..kept.len()).map(|i| TRIPLE * i).collect(),
+            joints: self.joints.iter().map(of_joint).collect(),
         }
     }
 
-    /// Stamps of the rows, s, and the first row of each stretch: whole numbers.
+    /// Stamps of the rows, s, three of each place.
     #[must_use]
-    pub fn places(&self) -> [Vec<f64>; 2] {
-        let starts = self.starts.iter().map(|row| *row as f64);
-        [self.time.clone(), starts.collect()]
+    pub fn stamps(&self) -> &[f64] {
+        &self.time
     }
 
     /// Position, velocity, acceleration and torque of a joint, and what its friction can be (0 to 3), with 4 more where it moves.
@@ -164,18 +177,18 @@ impl Excerpt {
         [q, qd, qdd, tau, states.collect()]
     }
 
-    /// From [`Excerpt::places`], and [`Excerpt::numbers`] of each joint; `None` if they are none of an excerpt.
+    /// From [`Excerpt::stamps`], and [`Excerpt::numbers`] of each joint; `None` if they are none of an excerpt.
     #[must_use]
-    pub fn of_numbers(
-        [time, starts]: [Vec<f64>; 2],
-        joints: &[[Vec<f64>; CHANNELS + 1]],
-    ) -> Option<Self> {
-        let rows = time.len();
-        let begins = |row: &f64| row.fract() == 0.0 && (0.0..rows as f64).contains(row);
-        let sound = starts.iter().all(begins)
-            && starts.is_sorted_by(|one, next| one < next)
-            && starts.is_empty() == time.is_empty()
-            && joints.iter().flatten().all(|values| values.len() == rows);
+    pub fn of_numbers(time: Vec<f64>, joints: &[[Vec<f64>; CHANNELS + 1]]) -> Option<Self> {
+        let ascends = |triple: &[f64]| triple.is_sorted_by(|one, next| one < next);
+        let finite = |values: &Vec<f64>| values.iter().all(|value| (*value as f32).is_finite());
+        let sound = time.len().is_multiple_of(TRIPLE)
+            && time.chunks(TRIPLE).all(ascends)
+            && time.iter().all(|stamp| stamp.is_finite())
+            && joints
+                .iter()
+                .flatten()
+                .all(|values| values.len() == time.len() && finite(values));
         let state = |number: &f64| {
             let whole = (number.fract() == 0.0 && *number >= 0.0).then_some(*number as usize)?;
             let live = whole >= ZONES.len();
@@ -192,7 +205,7 @@ impl Excerpt {
             })
         };
         let joints: Option<Vec<Joint>> = joints.iter().map(joint).collect();
-        let starts = starts.iter().map(|row| *row as usize).collect();
+        let starts = (0..time.len()).step_by(TRIPLE).collect();
         let joints = joints.filter(|_| sound)?;
         Some(Self {
             time,
@@ -202,8 +215,10 @@ impl Excerpt {
     }
 }
 
-fn every<T: Copy>(step: usize, values: &[T]) -> Vec<T> {
-    values.iter().step_by(step).copied().collect()
+/// The rows of these places.
+fn triples<T: Copy>(kept: &[usize], values: &[T]) -> Vec<T> {
+    let of_place = |place: &usize| values[TRIPLE * place..TRIPLE * (place + 1)].iter().copied();
+    kept.iter().flat_map(of_place).collect()
 }
 
 #[cfg(test)]
@@ -211,61 +226,85 @@ mod tests {
     use super::*;
     use crate::self_check::testing::{arm, log};
 
-    /// Numbers hold all of an excerpt; numbers that no excerpt has are refused.
-    #[test]
-    fn numbers_are_all_of_it() {
-        let pipeline = Pipeline {
+    fn pipeline() -> Pipeline {
+        Pipeline {
             cutoff_hz: 5.0,
             motion_cutoff_hz: 20.0,
             ..Pipeline::off(4)
-        };
-        let excerpt = Excerpt::of(&pipeline, &log(17.3));
-        let joints = arm(1.0).dof();
-        assert!(
-            excerpt.len() > MOST / 2 && excerpt.len() <= MOST,
-            "{}",
-            excerpt.len()
-        );
-        let numbers: Vec<_> = (0..joints).map(|joint| excerpt.numbers(joint)).collect();
-        let places = excerpt.places();
-        assert_eq!(
-            Excerpt::of_numbers(places.clone(), &numbers),
-            Some(excerpt.clone())
-        );
-        let mut other = numbers.clone();
-        for wrong in [8.0, 0.5, -1.0] {
-            other[1][4][7] = wrong;
-            assert_eq!(Excerpt::of_numbers(places.clone(), &other), None);
         }
-        let mut other = numbers.clone();
-        other[0][2].pop();
-        assert_eq!(Excerpt::of_numbers(places.clone(), &other), None);
-        for starts in [vec![1.0, 1.0], vec![0.5], vec![-1.0], vec![1e9], vec![]] {
-            let [time, _] = places.clone();
-            assert_eq!(Excerpt::of_numbers([time, starts], &numbers), None);
-        }
-        assert_eq!(excerpt.among(40), excerpt);
-        let few = excerpt.among(1000);
-        assert!(few.len() <= LEAST, "{}", few.len());
-        assert_eq!(
-            few.time(),
-            every(excerpt.len().div_ceil(LEAST), excerpt.time())
-        );
     }
 
-    /// A gap begins another stretch, also where rows are left out.
+    /// Numbers hold all of an excerpt; numbers that no excerpt has are refused.
     #[test]
-    fn stretches_begin_behind_gaps() {
-        let mut gapped = log(17.3);
-        let whole = gapped.segments[0].clone();
-        gapped.segments.push(whole);
-        let excerpt = Excerpt::of(&Pipeline::off(4), &gapped);
-        assert_eq!(excerpt.starts(), [0, excerpt.len() / 2]);
-        let few = excerpt.among(200);
-        let [first, second] = *few.starts() else {
-            panic!("{:?}", few.starts());
-        };
-        assert_eq!(first, 0);
-        assert!(few.time()[second] < few.time()[second - 1]);
+    fn numbers_are_all_of_it() {
+        let excerpt = Excerpt::of(&pipeline(), &log(17.3));
+        let rows = excerpt.len();
+        assert!(
+            rows > TRIPLE * MOST * 8 / 10 && rows <= TRIPLE * MOST,
+            "{rows}"
+        );
+        let joints = arm(1.0).dof();
+        let numbers: Vec<_> = (0..joints).map(|joint| excerpt.numbers(joint)).collect();
+        let stamps = excerpt.stamps().to_vec();
+        assert_eq!(Excerpt::of_numbers(stamps.clone(), &numbers), Some(excerpt));
+        type Damage = fn(&mut Vec<f64>, &mut Vec<[Vec<f64>; CHANNELS + 1]>);
+        let damages: [Damage; 8] = [
+            |_, all| all[1][4][7] = 8.0,
+            |_, all| all[1][4][7] = 0.5,
+            |_, all| all[1][4][7] = -1.0,
+            |_, all| all[0][2].truncate(5),
+            |_, all| all[0][3][5] = 1e300,
+            |time, _| time[4] = time[5],
+            |time, _| time[0] = f64::NAN,
+            |time, all| {
+                time.truncate(7);
+                all.iter_mut()
+                    .flatten()
+                    .for_each(|values| values.truncate(7));
+            },
+        ];
+        for (number, damage) in damages.iter().enumerate() {
+            let (mut stamps, mut numbers) = (stamps.clone(), numbers.clone());
+            damage(&mut stamps, &mut numbers);
+            assert_eq!(Excerpt::of_numbers(stamps, &numbers), None, "{number}");
+        }
+    }
+
+    /// No log has fewer rows than are compared, thinned once or twice.
+    #[test]
+    fn many_logs_are_thinned_evenly() {
+        let excerpt = Excerpt::of(&pipeline(), &log(17.3));
+        assert_eq!(excerpt.among(20), excerpt);
+        for (fitted, all) in [(41, 42), (160, 161), (279, 280), (400, 500)] {
+            let (once, twice) = (excerpt.among(all), excerpt.among(fitted).among(all));
+            assert_eq!(
+                (once.len(), twice.len()),
+                (once.len(), once.len()),
+                "{fitted}"
+            );
+            assert!(twice.len() >= TRIPLE * LEAST, "{fitted}");
+            let ends = |own: &Excerpt| own.stamps()[own.len() - 1] - own.stamps()[0];
+            assert!(ends(&twice) > 0.9 * ends(&excerpt), "{fitted}");
+        }
+    }
+
+    /// Rates are those of the torque, also where places are far apart; a log in a thousand pieces has no more rows than a whole one.
+    #[test]
+    fn rows_are_neighbours_and_no_more_than_those_of_a_whole_log() {
+        let whole = log(17.3);
+        let excerpt = Excerpt::of(&pipeline(), &whole);
+        let interval = whole.segments[0].interval;
+        for triple in excerpt.stamps().chunks(TRIPLE) {
+            let apart = [triple[1] - triple[0], triple[2] - triple[1]];
+            let expected = APART * WINDOW / 5.0;
+            assert!(
+                apart
+                    .iter()
+                    .all(|apart| (apart - expected).abs() <= 0.5 * interval)
+            );
+        }
+        let mut pieces = whole.clone();
+        pieces.segments = (0..1000).flat_map(|_| log(17.3).segments).collect();
+        assert!(Excerpt::of(&pipeline(), &pieces).len() <= TRIPLE * (MOST + 1));
     }
 }

@@ -56,15 +56,12 @@ fn bodies(regressor: &Regressor) -> usize {
     pairs.map(|pair| pair.body + 1).max().unwrap_or(0)
 }
 
-/// Rows of all logs that have torque; `logs` numbers them as given.
-pub(super) fn blocks(robot: &Robot, logs: &[&Excerpt]) -> Vec<Block> {
+/// Rows of all logs that have torque, in the order of the logs; `logs` numbers them as given.
+pub(super) fn blocks(robot: &Robot, logs: &[Excerpt]) -> Vec<Block> {
     let regressor = Regressor::new(robot);
-    let of_log = |(log, excerpt): (usize, &&Excerpt)| -> Vec<Block> {
-        let rows = excerpt.among(logs.len());
-        match rows.len() {
-            0 => Vec::new(),
-            _ => of_log((robot, &regressor), log, &rows),
-        }
+    let of_log = |(log, rows): (usize, &Excerpt)| match rows.len() {
+        0 => Vec::new(),
+        _ => of_log((robot, &regressor), log, rows),
     };
     let all: Vec<Vec<Block>> = logs.par_iter().enumerate().map(of_log).collect();
     all.into_iter().flatten().collect()

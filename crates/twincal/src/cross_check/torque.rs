@@ -8,6 +8,7 @@ use crate::rigid_fit::{Bins, leaning, settle};
 use crate::robot::Robot;
 use crate::signal::{Payload, Pipeline, Trajectory};
 use crate::words::significant;
+use rayon::prelude::*;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
@@ -76,6 +77,14 @@ enum Whose {
 }
 
 impl Whose {
+    /// The only log that it is about.
+    fn log(self) -> Option<usize> {
+        match self {
+            Self::Log(log) | Self::Block { log, .. } => Some(log),
+            Self::Joint(_) => None,
+        }
+    }
+
     fn has(self, block: &Block) -> bool {
         match self {
             Self::Log(log) => block.log == log,
@@ -137,13 +146,15 @@ pub fn odd_torque(robot: &Robot, logs: &[Compared<'_>], signs_are_right: bool) -
 /// The common fit, about the lean of the base where it sees one; `None` where too little moves. How far the base leans, under which inertias, the
 /// robust fit says, which holds both near the model's: with all of them free gravity may be anything.
 fn common_fit(robot: &Robot, logs: &[Compared<'_>]) -> Option<CommonFit> {
-    let excerpts: Vec<&Excerpt> = logs.iter().map(|log| &*log.excerpt).collect();
+    let excerpts: Vec<Excerpt> = (logs.par_iter())
+        .map(|log| log.excerpt.among(logs.len()))
+        .collect();
     let fit = |robot: &Robot| CommonFit::new(blocks(robot, &excerpts), parameters(robot));
     let upright = fit(robot)?;
     if leaning(robot, upright.gravity(), &[]).is_none() {
         return Some(upright);
     }
-    let bins: Vec<Bins> = excerpts.iter().map(|own| own.bins()).collect();
+    let bins: Vec<Bins> = excerpts.iter().map(Excerpt::bins).collect();
     match settle(robot, &bins).map(|settled| settled.robot) {
         Some(turned) if turned.description().gravity != robot.description().gravity => fit(&turned),
         _ => Some(upright),
@@ -158,7 +169,7 @@ fn lagging(own: Fitted<'_>, log: usize) -> Option<Vec<f64>> {
 
 /// The lag of each log, s.
 fn lags(fit: &CommonFit) -> BTreeMap<usize, f64> {
-    let of = |log: &usize| Some((*log, fit.effect(|own| lagging(own, *log))?.size));
+    let of = |log: &usize| Some((*log, fit.effect(Some(*log), |own| lagging(own, *log))?.size));
     fit.logs().iter().filter_map(of).collect()
 }
 
@@ -179,7 +190,7 @@ fn late(fit: &CommonFit, names: &Names<'_>) -> Option<Finding> {
     if apart < LATE {
         return None;
     }
-    let judged = fit.judged(|own| lagging(own, log))?;
+    let judged = fit.judged(Some(log), |own| lagging(own, log))?;
     let clear = judged.z() > CLEAR && judged.explains > EXPLAINS_LAG;
     clear.then(|| names.lag(log, lag, judged.sd))
 }
@@ -200,7 +211,7 @@ fn next_factor(fit: &mut CommonFit, joints_too: bool) -> Option<(Whose, f64, f64
             fit.divide(|block| block.log == log, factor);
         }
     }
-    let of = |fit: &CommonFit, whose: Whose| fit.effect(|own| rigid(own, whose));
+    let of = |fit: &CommonFit, whose: Whose| fit.effect(whose.log(), |own| rigid(own, whose));
     if whose.is_none() {
         let all = Whose::all(&logs, &joints, joints_too).into_iter();
         let effects = all.filter_map(|whose| Some((whose, of(fit, whose)?)));
@@ -208,7 +219,7 @@ fn next_factor(fit: &mut CommonFit, joints_too: bool) -> Option<(Whose, f64, f64
         if effect.size.abs() < 0.5 * MATTERS || effect.explains < EXPLAINS {
             return None;
         }
-        let judged = fit.judged(|own| rigid(own, best))?;
+        let judged = fit.judged(best.log(), |own| rigid(own, best))?;
         if judged.z() < CLEAR {
             return None;
         }
@@ -225,7 +236,7 @@ fn next_factor(fit: &mut CommonFit, joints_too: bool) -> Option<(Whose, f64, f64
             break;
         }
     }
-    let sd = fit.judged(|own| rigid(own, whose))?.sd * factor.abs();
+    let sd = fit.judged(whose.log(), |own| rigid(own, whose))?.sd * factor.abs();
     let clear = (factor - 1.0).abs() > CLEAR * sd && (factor - 1.0).abs() >= MATTERS;
     if clear && fit.left(|block| whose.has(block)) < LEFT {
         return Some((whose, factor, sd));
@@ -245,7 +256,7 @@ fn drifts(mut fit: CommonFit, names: &Names<'_>) -> Vec<Finding> {
     }
     let (fit, logs) = (&fit, fit.logs());
     let of = |which: Option<usize>| {
-        let drift = fit.judged(|own| {
+        let drift = fit.judged(which, |own| {
             let block = own.block();
             which
                 .is_none_or(|log| log == block.log)
@@ -259,7 +270,9 @@ fn drifts(mut fit: CommonFit, names: &Names<'_>) -> Vec<Finding> {
     }
     // Of many logs only those that stand out are looked at closely: rows count as independent here.
     let stands_out = |log: &&usize| {
-        let drift = fit.effect(|own| (own.block().log == **log).then(|| growing(own)));
+        let drift = fit.effect(Some(**log), |own| {
+            (own.block().log == **log).then(|| growing(own))
+        });
         let large = |drift: &Effect| drift.size.abs() > CLOCKS && drift.gain > DRIFTS * DRIFTS;
         logs.len() > 1 && drift.as_ref().is_some_and(large)
     };

@@ -63,11 +63,7 @@ pub(crate) fn bins(
     trajectory: &Trajectory,
     stopped: &[[f64; 2]],
 ) -> Vec<Bins> {
-    let seconds = if pipeline.is_off() {
-        WIDTH
-    } else {
-        WIDTH.max(PERIODS / pipeline.cutoff_hz)
-    };
+    let seconds = seconds(pipeline);
     let first = trajectory.segments.first();
     let width = first.map_or(1, |s| {
         ((seconds / s.interval * (1.0 + 1e-9)) as usize).max(1)
@@ -76,6 +72,14 @@ pub(crate) fn bins(
     segments
         .map(|segment| Bins::new(robot.dof(), segment, width, stopped))
         .collect()
+}
+
+/// Width of bins, s.
+fn seconds(pipeline: &Pipeline) -> f64 {
+    match pipeline.is_off() {
+        true => WIDTH,
+        false => WIDTH.max(PERIODS / pipeline.cutoff_hz),
+    }
 }
 
 impl Bins {
@@ -123,7 +127,7 @@ impl Bins {
         }
     }
 
-    /// Each row as one bin. `motion`: position, velocity, acceleration and torque, joint by joint; `zones` likewise.
+    /// Each row as one bin; the shapes of dry friction are those of its velocity, which is the same where the joint slides. `motion`: position, velocity, acceleration and torque, joint by joint; `zones` likewise.
     pub(crate) fn of_rows(time: &[f64], motion: &[Vec<f64>; 4], zones: Vec<Zone>) -> Self {
         let count = time.len();
         let of_joint = |joint: usize| {
@@ -229,11 +233,15 @@ impl Zone {
     }
 
     /// Zone of a joint in these samples of a segment, without what is known of its drives.
-    pub(crate) fn at(segment: &Segment, joint: usize, samples: &Range<usize>) -> Self {
+    pub(crate) fn at(
+        (pipeline, segment): (&Pipeline, &Segment),
+        joint: usize,
+        samples: &Range<usize>,
+    ) -> Self {
         let len = segment.time.len();
         let own = joint * len..(joint + 1) * len;
         let (velocity, still) = (&segment.qd[own.clone()], &segment.standstill[own]);
-        let memory = (MEMORY as f64 * WIDTH / segment.interval).round() as usize;
+        let memory = (MEMORY as f64 * seconds(pipeline) / segment.interval).round() as usize;
         let near = samples.start.saturating_sub(memory)..(samples.end + memory).min(len);
         let masked = still[samples.clone()].iter().any(|still| *still);
         let turns = || is_slow(&ends(&velocity[near]));

@@ -33,17 +33,18 @@ pub(super) fn numbers(
     let all = with_errors(&at, (value, covariance));
     let parameters = library.parameters(index);
     let place = |name: &str| parameters.iter().position(|own| own.name == name);
-    let (mass, sd) = all[place("mass")?];
-    let others = match mass.abs() > CLEAR * sd {
-        true => ["com_x", "com_y", "com_z"],
-        false => ["mx", "my", "mz"],
-    };
-    let seen = |name: &&str| {
+    let is_seen = |name: &str| {
         let known = place(name).map(|own| library.before(index, own));
         known.is_some_and(|before| before != Some(Before::Hidden))
     };
-    let names = std::iter::once("mass").chain(others.into_iter().filter(seen));
-    let told = names.filter_map(|name| {
+    let (mass, sd) = all[place("mass")?];
+    let others = match is_seen("mass") && mass.abs() > CLEAR * sd {
+        true => ["com_x", "com_y", "com_z"],
+        false => ["mx", "my", "mz"],
+    };
+    let names = std::iter::once("mass").chain(others);
+    let names = names.filter(|name| is_seen(name));
+    let numbers = names.filter_map(|name| {
         let place = place(name)?;
         let (value, sd) = all[place];
         Some(ChangeNumber {
@@ -53,7 +54,7 @@ pub(super) fn numbers(
             sd,
         })
     });
-    Some(told.collect())
+    Some(numbers.collect())
 }
 
 /// What `at` makes of `value`, and its standard errors to first order in that of `value`.

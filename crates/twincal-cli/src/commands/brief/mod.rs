@@ -23,6 +23,8 @@ use twincal_io::words::{self, Answer};
 /// Lines of the whole output, and of that on a narrow terminal.
 const LINES: usize = 40;
 const LINES_NARROW: usize = 55;
+/// Lines that a command takes at most.
+const COMMAND_LINES: usize = 5;
 /// Columns below which a terminal is narrow.
 const NARROW: usize = 80;
 
@@ -84,7 +86,7 @@ pub(in crate::commands) struct Around<'a> {
     pub(in crate::commands) typed: Option<Typed<'a>>,
 }
 
-/// Paths as they were typed, so that commands with them run where this one did.
+/// Paths as they were typed, so that commands with them run where this one did; nothing else was said with flags.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::commands) struct Typed<'a> {
     pub(in crate::commands) model: &'a Path,
@@ -92,29 +94,33 @@ pub(in crate::commands) struct Typed<'a> {
     pub(in crate::commands) heldout: &'a [PathBuf],
 }
 
-/// Logs that a command names at most.
-const NAMED: usize = 6;
+/// Letters of the paths in a command at most: a longer one stands for itself alone.
+const LETTERS: usize = 120;
 
 impl Typed<'_> {
-    /// `twincal doctor …` of these logs.
-    fn doctor(self) -> String {
-        let logs = paths(self.logs.iter().chain(self.heldout));
-        let model = quoted(&self.model.to_string_lossy());
-        format!("twincal doctor {logs} --model {model}")
+    /// `twincal doctor …` of these logs; `None` where that is long.
+    fn doctor(self) -> Option<String> {
+        let logs = paths(self.logs.iter().chain(self.heldout))?;
+        let model = paths(std::iter::once(self.model))?;
+        Some(format!("twincal doctor {logs} --model {model}"))
     }
 
     /// `twincal check …` of the held-out logs.
-    fn check(self, output: &str) -> String {
-        let logs = paths(self.heldout.iter());
-        format!("twincal check {logs} --twin {output}")
+    fn check(self, output: &str) -> Option<String> {
+        let logs = paths(self.heldout.iter())?;
+        Some(format!("twincal check {logs} --twin {output}"))
     }
 }
 
-fn paths<'a>(all: impl Iterator<Item = &'a PathBuf>) -> String {
-    let words: Vec<String> = (all.take(NAMED))
-        .map(|path| quoted(&path.to_string_lossy()))
+/// All of them, quoted; `None` of none, and where they are long.
+fn paths(all: impl Iterator<Item = impl AsRef<Path>>) -> Option<String> {
+    let words: Vec<String> = all
+        .map(|path| quoted(&path.as_ref().to_string_lossy()))
         .collect();
-    words.join(" ")
+    let words = words.join(" ");
+    (1..=LETTERS)
+        .contains(&words.chars().count())
+        .then_some(words)
 }
 
 /// Prints all but the last line, which is the report's path.
@@ -253,20 +259,20 @@ fn next(
         }
         assess::Answer::NotYet | assess::Answer::No => doubted(answer, around.typed, &output),
     };
-    page.paragraph(&command, begin, width, 3);
+    page.paragraph(&command, begin, width, COMMAND_LINES);
     page.blank();
 }
 
 /// The command that says more of a doubt.
 fn doubted(answer: &Answer, typed: Option<Typed<'_>>, output: &str) -> String {
-    let doctor = "says what is wrong with a log or the model";
-    match typed {
-        Some(typed) if answer.reason == Code::AnotherState => {
-            format!("{} says what may have changed", typed.check(output))
-        }
-        Some(typed) => format!("{} {doctor}", typed.doctor()),
-        None => format!("twincal doctor LOG --model MODEL {doctor}"),
+    if answer.reason == Code::AnotherState {
+        let check = typed.and_then(|typed| typed.check(output));
+        let check = check.unwrap_or_else(|| format!("twincal check LOG --twin {output}"));
+        return format!("{check} says what may have changed");
     }
+    let doctor = typed.and_then(Typed::doctor);
+    let doctor = doctor.unwrap_or_else(|| "twincal doctor LOG --model MODEL".to_owned());
+    format!("{doctor} says what is wrong with a log or the model")
 }
 
 #[cfg(test)]

@@ -65,8 +65,7 @@ fn words(change: &Change, [limit, least]: [f64; 2]) -> String {
             "Calibrate its encoder, or fit again.",
         ),
     };
-    let numbers: Vec<String> = change.numbers.iter().map(number).collect();
-    let numbers = numbers.join(", ");
+    let numbers = numbers(change);
     let share = significant(change.share, 2);
     if change.changed {
         return format!(
@@ -91,28 +90,79 @@ fn probability(p: f64) -> String {
     }
 }
 
-/// `viscous +0.15 ± 0.01 N·m·s/rad`.
-fn number(number: &twincal::validate::ChangeNumber) -> String {
+/// `mass +1.2 ± 0.1 kg, centre of mass x +3 ± 1 mm, y +30 ± 2 mm`: the noun once.
+fn numbers(change: &Change) -> String {
+    let mut before = "";
+    let numbers = change.numbers.iter().map(|own| {
+        let (noun, number) = number(own);
+        let again = !before.is_empty() && noun == before;
+        before = noun;
+        match again || noun.is_empty() {
+            true => number,
+            false => format!("{noun} {number}"),
+        }
+    });
+    let numbers: Vec<String> = numbers.collect();
+    numbers.join(", ")
+}
+
+/// What several numbers have in common, and `viscous +0.15 ± 0.01 N·m·s/rad`.
+fn number(number: &twincal::validate::ChangeNumber) -> (&'static str, String) {
     let (_, own) = number.name.rsplit_once('.').unwrap_or(("", &number.name));
     let (factor, unit) = match own {
         "encoder_zero" => Family::EncoderZero.told_in(&number.unit),
         "com_x" | "com_y" | "com_z" => Family::Payload.told_in(&number.unit),
         _ => (1.0, number.unit.as_str()),
     };
-    let own = match own {
-        "encoder_zero" => "moved by",
-        "com_x" => "centre of mass x",
-        "com_y" => "y",
-        "com_z" => "z",
-        "mx" => "first moment x",
-        "my" => "y",
-        "mz" => "z",
-        own => own,
+    let (noun, own) = match own {
+        "encoder_zero" => ("", "moved by"),
+        "com_x" => ("centre of mass", "x"),
+        "com_y" => ("centre of mass", "y"),
+        "com_z" => ("centre of mass", "z"),
+        "mx" => ("first moment", "x"),
+        "my" => ("first moment", "y"),
+        "mz" => ("first moment", "z"),
+        own => ("", own),
     };
     let plus = if number.value > 0.0 { "+" } else { "" };
-    format!(
+    let text = format!(
         "{own} {plus}{} ± {} {unit}",
         significant(factor * number.value, 3),
         significant(factor * number.sd, 2)
-    )
+    );
+    (noun, text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use twincal::validate::ChangeNumber;
+
+    #[test]
+    fn a_payload_has_its_nouns_whichever_parts_are_seen() {
+        let number = |(name, value): (&str, f64)| ChangeNumber {
+            name: format!("payload.{name}"),
+            unit: if name == "mass" { "kg" } else { "m" }.into(),
+            value,
+            sd: 0.002,
+        };
+        let numbers_of = |numbers| {
+            let change = Change {
+                kind: ChangeKind::Payload,
+                subject: "payload".into(),
+                frame: Some("tool0".into()),
+                numbers,
+                chance: 0.0,
+                share: 1.0,
+                changed: true,
+            };
+            super::numbers(&change)
+        };
+        let of =
+            |numbers: &[(&str, f64)]| numbers_of(numbers.iter().copied().map(number).collect());
+        assert_eq!(
+            of(&[("mass", 1.5), ("com_y", 0.03), ("com_z", -0.01)]),
+            "mass +1.50 ± 0.0020 kg, centre of mass y +30.0 ± 2.0 mm, z -10.0 ± 2.0 mm"
+        );
+    }
 }

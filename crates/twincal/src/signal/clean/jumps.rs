@@ -293,6 +293,7 @@ fn tell(joints: &[JointFacts], log: &Recording, found: &Found, every_row: bool) 
         );
         let count = jumps.len() as u64;
         let finding = Finding::new(Severity::Warning, code, &log.name, message, count);
+        let finding = finding.of_joint(&facts.name);
         Some(finding.with([("largest", largest.1), ("largest_at", log.time[largest.0])]))
     };
     kinds.into_iter().filter_map(of_kind).collect()

@@ -74,6 +74,7 @@ pub(crate) fn findings(names: &[&str], log: &str, agreement: &[Option<Agreement>
                  late or of another joint; with [signal] velocity = \"position\" it is not used"
             );
             Finding::new(Severity::Warning, Code::VelocityMismatch, log, message, 0)
+                .of_joint(*name)
                 .with([("r2", r2), ("slope", slope)])
         })
         .collect()
