@@ -6,7 +6,7 @@ mod gates;
 use super::inputs::LogInput;
 use super::summary::{Notes, findings, paragraph};
 use super::table::{print_table, table};
-use super::{print_json, require_strict, settings, start_threads};
+use super::{print_json, require_strict, settings, start_threads, verdict};
 use crate::args::Check;
 use crate::exit;
 use crate::failure::{Failure, Outcome};
@@ -15,7 +15,7 @@ use crate::terminal::{Terminal, clean};
 use gates::{ALL, ENOUGH, Gate, Own, judge};
 use serde::Serialize;
 use twincal::Code;
-use twincal::assess::{Answer, Assessment, Claim, of_gates};
+use twincal::assess::{Answer, Assessment, Claim, assess, of_gates};
 use twincal::calibrate::Calibration;
 use twincal::self_check::self_check;
 use twincal::signal::Trajectory;
@@ -106,6 +106,8 @@ pub(super) fn run(flags: &Check, terminal: &mut Terminal) -> Outcome<u8> {
     let names: Vec<&str> = logs.logs.iter().map(|log| log.name()).collect();
     let assessment = assessment(&gates, &found, (&stored.calibration, &names));
     let verdict = Verdict::of(assessment.answer);
+    // What is said of the twin itself does not change what is said of these logs.
+    found.extend(unusable(&stored.calibration));
     let code = exit::of_check(assessment.answer, &found);
     if settings.json {
         let said = (assessment, gates, found);
@@ -125,6 +127,12 @@ pub(super) fn run(flags: &Check, terminal: &mut Terminal) -> Outcome<u8> {
     terminal.say("");
     findings(&found, Notes::In("the output of --json"), terminal);
     Ok(code)
+}
+
+/// A warning that the twin's own answer is no or not yet.
+fn unusable(calibration: &Calibration) -> Option<Finding> {
+    let usable = assess(calibration).answer <= Answer::YesWithinLimits;
+    verdict::doubt(calibration).filter(|_| !usable)
 }
 
 /// # Errors

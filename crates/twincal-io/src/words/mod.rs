@@ -154,7 +154,7 @@ pub(crate) mod tests {
 
     /// Every number of a claim stands at its code.
     fn require_known_numbers(calibration: &Calibration) {
-        for claim in assess(calibration).claims {
+        for claim in twincal::assess::assess(calibration).claims {
             let of_claims = claim.code.evidence_of_claims();
             let known = |name: &str| {
                 let names = [of_claims, claim.code.evidence(), &["count"]].concat();

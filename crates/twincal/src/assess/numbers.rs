@@ -57,7 +57,10 @@ pub const NUMBERS: &[(&str, &str)] = &[
         "rms_friction",
         "error of the model with friction and an offset alone",
     ),
-    ("rms_nominal", "error of the model as it was"),
+    (
+        "rms_nominal",
+        "error of the model as it was, without the friction that its file states",
+    ),
     ("rms_within", "error on rows like those of training"),
     ("rows", "held-out rows"),
     ("rows_at_rest", "held-out rows at rest"),
@@ -75,7 +78,10 @@ pub const NUMBERS: &[(&str, &str)] = &[
         "torque_sd",
         "standard deviation of the measured torque, N·m or N",
     ),
-    ("value", "what the gate judges"),
+    (
+        "value",
+        "what the gate judges: an error in N·m or N, a share, or of a change the probability of such an estimate without one",
+    ),
     (
         "width_needed",
         "part of the intervals' width that would have held 95 % of the rows",

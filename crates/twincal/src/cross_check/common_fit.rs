@@ -8,6 +8,7 @@
 //! column c more, whose coefficient is `γ = c̃ᵀe / c̃ᵀRc̃`, R the residual maker; its sd comes from sums over seconds (Liang & Zeger 1986), so that
 //! correlated residuals do not count as many.
 
+use super::excerpt::TRIPLE;
 use super::rows::{Block, FRICTION};
 use crate::linear_algebra::{Cholesky, dot};
 use std::collections::BTreeMap;
@@ -300,17 +301,23 @@ impl Fitted<'_> {
         self.0.rigid.clone()
     }
 
-    /// Change of the fitted torque, friction included, N·m/s; 0 at the ends of stretches.
+    /// Change of the fitted torque, friction included, N·m/s: that of the parabola through three neighbours.
     pub(super) fn rate(&self) -> Vec<f64> {
         let (block, torque) = (&self.0.block, &self.0.all);
-        let mut rate = vec![0.0; block.rows()];
-        for i in 1..block.rows().saturating_sub(1) {
-            let is_start = |row: usize| block.starts.binary_search(&row).is_ok();
-            if !is_start(i) && !is_start(i + 1) {
-                rate[i] = (torque[i + 1] - torque[i - 1]) / (block.time[i + 1] - block.time[i - 1]);
-            }
+        let mut rates = vec![0.0; block.rows()];
+        let (triples, _) = torque.as_chunks::<TRIPLE>();
+        let (times, _) = block.time.as_chunks::<TRIPLE>();
+        let (own, _) = rates.as_chunks_mut::<TRIPLE>();
+        for ((rate, [before, here, after]), time) in own.iter_mut().zip(triples).zip(times) {
+            let per_second = 1.0 / (time[2] - time[0]);
+            *rate = [
+                4.0 * here - 3.0 * before - after,
+                after - before,
+                before - 4.0 * here + 3.0 * after,
+            ]
+            .map(|change| change * per_second);
         }
-        rate
+        rates
     }
 }
 

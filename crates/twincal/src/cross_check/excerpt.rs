@@ -5,7 +5,7 @@ use crate::signal::{Pipeline, Segment, Trajectory};
 
 /// Places of one log at most, at each of which three neighbouring rows are kept: their differences are rates, however long the log is.
 const MOST: usize = 100;
-const TRIPLE: usize = 3;
+pub(super) const TRIPLE: usize = 3;
 /// Places of all logs about, and of each at least.
 const OF_ALL: usize = 4_000;
 const LEAST: usize = 16;
@@ -26,8 +26,6 @@ const CHANNELS: usize = 4;
 pub struct Excerpt {
     /// s.
     time: Vec<f64>,
-    /// First row of each place.
-    starts: Vec<usize>,
     joints: Vec<Joint>,
 }
 
@@ -81,8 +79,6 @@ impl Excerpt {
         let places = (first..len).step_by(step);
         let places = places.filter(|i| *i >= reach && i + reach < len);
         let centres: Vec<usize> = places.flat_map(|i| [i - apart, i, i + apart]).collect();
-        let starts = self.time.len()..self.time.len() + centres.len();
-        self.starts.extend(starts.step_by(TRIPLE));
         self.time.extend(centres.iter().map(|i| segment.time[*i]));
         let from = [&segment.q, &segment.qd, &segment.qdd, &segment.tau];
         for (joint, rows) in self.joints.iter_mut().enumerate() {
@@ -114,10 +110,6 @@ impl Excerpt {
         &self.time
     }
 
-    pub(super) fn starts(&self) -> &[usize] {
-        &self.starts
-    }
-
     pub(super) fn live(&self, joint: usize) -> &[bool] {
         &self.joints[joint].live
     }
@@ -141,7 +133,10 @@ impl Excerpt {
     /// As many rows as a comparison of so many logs takes of each, evenly taken.
     #[must_use]
     pub fn among(&self, logs: usize) -> Self {
-        let (places, most) = (self.starts.len(), (OF_ALL / logs.max(1)).clamp(LEAST, MOST));
+        let (places, most) = (
+            self.time.len() / TRIPLE,
+            (OF_ALL / logs.max(1)).clamp(LEAST, MOST),
+        );
         let kept = places.min(most);
         let kept: Vec<usize> = (0..kept).map(|i| i * places / kept).collect();
         let of_joint = |own: &Joint| Joint {
@@ -151,7 +146,6 @@ impl Excerpt {
         };
         Self {
             time: triples(&kept, &self.time),
-            starts: (0..kept.len()).map(|i| TRIPLE * i).collect(),
             joints: self.joints.iter().map(of_joint).collect(),
         }
     }
@@ -205,13 +199,8 @@ impl Excerpt {
             })
         };
         let joints: Option<Vec<Joint>> = joints.iter().map(joint).collect();
-        let starts = (0..time.len()).step_by(TRIPLE).collect();
         let joints = joints.filter(|_| sound)?;
-        Some(Self {
-            time,
-            starts,
-            joints,
-        })
+        Some(Self { time, joints })
     }
 }
 

@@ -16,12 +16,10 @@ pub(super) const FRICTION: usize = 4;
 pub(super) struct Block {
     pub(super) log: usize,
     pub(super) joint: usize,
-    /// s.
+    /// s; rows are [`TRIPLE`](super::excerpt::TRIPLE) neighbours each.
     pub(super) time: Vec<f64>,
     /// Whether the joint moves and its torque says something.
     pub(super) live: Vec<bool>,
-    /// First row of each stretch without a gap.
-    pub(super) starts: Vec<usize>,
     /// Columns of the common parameters that are not zero, and their numbers: `x[k * rows + row]`.
     pub(super) columns: Vec<usize>,
     pub(super) x: Vec<f64>,
@@ -85,7 +83,6 @@ fn of_log((robot, regressor): (&Robot, &Regressor), log: usize, rows: &Excerpt) 
             joint,
             time: rows.time().to_vec(),
             live: rows.live(joint).to_vec(),
-            starts: rows.starts().to_vec(),
             columns: vec![10 * bodies(regressor) + joint],
             x: qdd[own.clone()].to_vec(),
             friction: friction(&qd[own.clone()]),

@@ -24,7 +24,7 @@ use twincal_io::words::{self, Answer};
 const LINES: usize = 40;
 const LINES_NARROW: usize = 55;
 /// Lines that a command takes at most.
-const COMMAND_LINES: usize = 5;
+const COMMAND_LINES: usize = 7;
 /// Columns below which a terminal is narrow.
 const NARROW: usize = 80;
 
@@ -95,7 +95,7 @@ pub(in crate::commands) struct Typed<'a> {
 }
 
 /// Letters of the paths in a command at most: a longer one stands for itself alone.
-const LETTERS: usize = 120;
+const LETTERS: usize = 240;
 
 impl Typed<'_> {
     /// `twincal doctor …` of these logs; `None` where that is long.
