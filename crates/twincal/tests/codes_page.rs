@@ -13,7 +13,7 @@ fn page() -> String {
 #[test]
 fn the_page_has_the_answer_of_every_code_that_decides() {
     let page = page();
-    let (table, _) = page.split_once("## All codes").expect("the table");
+    let (table, _) = page.split_once("## Exit codes").expect("the table");
     let rows: Vec<(&str, &str)> = table
         .lines()
         .filter_map(|line| {

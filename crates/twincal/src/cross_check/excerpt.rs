@@ -4,7 +4,7 @@ use crate::rigid_fit::{Bins, Zone};
 use crate::signal::{Pipeline, Segment, Trajectory};
 
 /// Places of one log at most, at each of which three neighbouring rows are kept: their differences are rates, however long the log is.
-const MOST: usize = 100;
+const MOST: usize = 200;
 pub(super) const TRIPLE: usize = 3;
 /// Places of all logs about, and of each at least.
 const OF_ALL: usize = 4_000;

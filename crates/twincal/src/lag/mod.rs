@@ -22,12 +22,15 @@ use crate::signal::{Lag, Pipeline, Trajectory};
 use crate::words::significant;
 use estimate::{Estimate, estimate};
 use pool::agreed;
+use rows::REACH;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// A lag is there beyond this many standard deviations, and where this share of what is left of left-out rows goes with it.
 const CLEARLY: f64 = 3.0;
 const IMPROVES: f64 = 0.02;
+/// Share of the longest lag that is looked for from which on an estimate is at its end, and none: torque of the wrong sign has one there.
+const END: f64 = 0.9;
 /// A lag with a larger standard deviation says nothing, s; nor that of one joint that differs.
 const VAGUE: f64 = 0.02;
 const SHARP: f64 = 0.005;
@@ -129,7 +132,8 @@ pub fn lags(robot: &Robot, pipeline: &Pipeline, logs: &[&Trajectory]) -> Option<
     let mut found = estimate(robot, pipeline, logs)?;
     let names = robot.joint_names();
     let votes = Votes::new(&found);
-    let clear = votes.common.filter(|[lag, sd]| lag.abs() > CLEARLY * sd);
+    let is_clear = |[lag, sd]: &[f64; 2]| lag.abs() > CLEARLY * sd && lag.abs() < END * REACH;
+    let clear = votes.common.filter(is_clear);
     let mut moved = vec![clear.map_or(0.0, |[lag, _]| lag); names.len()];
     let apart = || votes.joints.iter().zip(&votes.apart);
     for ((joint, [lag, _]), _) in apart().filter(|(_, apart)| **apart) {
