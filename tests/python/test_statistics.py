@@ -97,7 +97,7 @@ def test_other_programs_read_the_files(files, tmp_path):
     twincal("merge", *files, "-o", merged)
     read = pa.ipc.open_file(merged)
     metadata = json.loads(read.schema.metadata[b"twincal.statistics"])
-    assert metadata["format"] == 4 and read.num_record_batches == 2
+    assert metadata["format"] == 5 and read.num_record_batches == 2
     names = ["monday.csv", "run.csv"]
     assert [log["name"] for log in metadata["logs"]] == names
     for number, name in enumerate(names):
