@@ -212,13 +212,13 @@ fn ends(velocity: &[f64]) -> [f64; 2] {
     [least, most]
 }
 
-/// It turns round or creeps.
+/// It reverses or creeps.
 fn is_slow([least, most]: &[f64; 2]) -> bool {
     least * most <= 0.0 || least.abs().min(most.abs()) < SLOW
 }
 
 impl Zone {
-    /// Where velocity has these ends, torque is masked somewhere or not, and the joint turns round or creeps nearby.
+    /// Where velocity has these ends, torque is masked somewhere or not, and the joint reverses or creeps nearby.
     fn of([least, most]: [f64; 2], masked: bool, turns: impl FnOnce() -> bool) -> Self {
         let fastest = least.abs().max(most.abs());
         if masked && fastest > 2.0 * SLOW {
