@@ -206,7 +206,9 @@ impl Verdict {
 fn assessment(gates: &[Gate], found: &[Finding], known: (&Calibration, &[&str])) -> Assessment {
     let mut claims: Vec<Claim> = gates.iter().filter_map(Gate::claim).collect();
     let fails = gates.iter().any(|gate| !gate.passed);
-    if claims.is_empty() && (fails || !gates.iter().any(|gate| gate.enough)) {
+    // That no change is seen says nothing of how much could be.
+    let mut of_joints = gates.iter().filter(|gate| !changes::is_change(gate));
+    if claims.is_empty() && (fails || !of_joints.any(|gate| gate.enough)) {
         claims.push(Claim::of_run(Code::TooShortToCheck));
     }
     of_gates(claims, found, known)
@@ -399,6 +401,33 @@ fn no_measurement(twin: &Twin, motion: &Trajectory) -> Result<Vec<Finding>> {
 mod tests {
     use super::gates::tests::scores;
     use super::*;
+    use crate::commands::brief::tests::fitted;
+
+    /// A gate of changes always has its rows; it does not make up for those that a joint lacks.
+    #[test]
+    fn that_no_change_is_seen_in_few_rows_is_no_pass() {
+        let gate = |gate, code, enough| Gate {
+            rows: ALL,
+            joint: "elbow".into(),
+            gate,
+            code,
+            passed: true,
+            value: 1.0,
+            limit: [None, Some(2.0)],
+            words: String::new(),
+            enough,
+        };
+        let of = |enough| {
+            let gates = [
+                gate("rmse", Code::ErrorAboveGate, enough),
+                gate("friction", Code::FrictionChanged, true),
+            ];
+            let judged = assessment(&gates, &[], (&fitted(), &[]));
+            (judged.answer, judged.reason)
+        };
+        assert_eq!(of(false), (Answer::NotYet, Code::TooShortToCheck));
+        assert_eq!(of(true).0, Answer::Yes);
+    }
 
     /// 10 moving rows with squares of 1 and 30 at standstill with 9: 40 rows with a mean square of 7; 9 and 15 of them in the interval.
     #[test]
