@@ -132,7 +132,7 @@ struct Bracket {
 }
 
 impl Bracket {
-    /// For a mixture at these locations instead of its own.
+    /// For the same mixture at other locations.
     #[inline(always)]
     fn of(mixture: &Mixture<'_>, locations: &[f64], standard: f64) -> Self {
         let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);

@@ -141,6 +141,32 @@ fn answer() -> Answer {
     }
 }
 
+/// Commands are of the paths as typed; where those are long the command stands for itself.
+#[test]
+fn doubted_twins_get_the_command_that_was_typed() {
+    let paths = |names: &[&str]| names.iter().map(PathBuf::from).collect::<Vec<_>>();
+    let said = |reason, logs: &[&str]| {
+        let (logs, heldout) = (paths(logs), paths(&["new run.csv"]));
+        let typed = Typed {
+            model: Path::new("arm.urdf"),
+            logs: &logs,
+            heldout: &heldout,
+        };
+        let answer = Answer { reason, ..answer() };
+        doubted(&answer, Some(typed), "out")
+    };
+    assert_eq!(
+        said(Code::FewHeldOutRows, &["run1.csv"]),
+        "twincal doctor run1.csv 'new run.csv' --model arm.urdf says what is wrong with a log or the model"
+    );
+    assert_eq!(
+        said(Code::AnotherState, &["run1.csv"]),
+        "twincal check 'new run.csv' --twin out says what may have changed"
+    );
+    let long = "x".repeat(LETTERS);
+    assert!(said(Code::FewHeldOutRows, &[&long]).starts_with("twincal doctor LOG --model MODEL "));
+}
+
 fn printed(calibration: &Calibration, columns: usize) -> Vec<String> {
     let around = Around {
         output: Path::new("twincal-out"),

@@ -88,7 +88,7 @@ fn none_yet(prior_sd: Vec<Option<f64>>) -> Columns {
 fn unknown_forced(name: &str) -> Error {
     Error::Setting {
         key: "prior.forced".into(),
-        problem: format!("no candidate `{name}` with torque of its own in these logs"),
+        problem: format!("no candidate `{name}` that has torque in these logs"),
         remedy: "give names of components as `twincal fit` prints them, such as \"elbow.viscous\""
             .into(),
     }

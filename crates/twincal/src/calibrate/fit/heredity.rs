@@ -113,7 +113,7 @@ pub(in crate::calibrate) fn force_parents(parent: &[Option<usize>], forced: &mut
 fn unknown(child: &str, name: &str) -> Error {
     Error::Setting {
         key: format!("prior.heredity.{child}"),
-        problem: format!("no candidate `{name}` with torque of its own in these logs"),
+        problem: format!("no candidate `{name}` that has torque in these logs"),
         remedy: "pair components by name, as `twincal fit` prints them (\"elbow.stribeck\" = \"elbow.coulomb\"), or families (stribeck = \"coulomb\")"
             .into(),
     }
