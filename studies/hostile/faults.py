@@ -157,6 +157,20 @@ def in_all(change):
     return apply
 
 
+def exchanged(study, rng):
+    """Two neighbouring joints have each other's torque, in the first training log."""
+    j, log = elbow(study), study.train[0]
+    log.tau[:, [j - 1, j]] = log.tau[:, [j, j - 1]]
+    names(study, "train1.csv", j)
+
+
+def not_recorded(study, rng):
+    """One joint's torque is 0 throughout the first training log."""
+    j = elbow(study)
+    study.train[0].tau[:, j] = 0.0
+    names(study, "train1.csv", j)
+
+
 def turned(study, log, tau):
     """Torque of the other sign."""
     return -tau
@@ -347,6 +361,8 @@ FAULTS = {
     "torque_other_column": Fault("one joint has its neighbour's torque", torque_other_column, ("torque_copied",), "joint"),
     "torque_constant": Fault("one joint, all logs", torque_constant, ("constant_torque", "torque_constant"), "joint"),
     "torque_held": Fault("one joint, one log, new every 200 ms", torque_held, ("torque_held", "stale_torque"), "joint"),
+    "zero_one_log": Fault("0 throughout, one joint, one log", not_recorded, ("constant_torque", "torque_constant"), "joint"),
+    "exchanged_one_log": Fault("two joints' torque, one log", exchanged, ("log_torque_exchanged",), "log"),
     "turned_one_log": Fault("all joints of one log", in_one_log(turned), ("sign_flip", "log_torque_factor"), "log"),
     "turned_one_joint": Fault("one joint, all logs", in_one_joint(turned), ("sign_flip", "joint_torque_factor"), "joint"),
     "scaled_one_log": Fault("× 1.2, all joints of one log", in_one_log(scaled(1.2)), ("torque_scale", "log_torque_factor"), "log"),

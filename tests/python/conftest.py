@@ -6,7 +6,10 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
+# One thread per worker: matrices here are small, and threads of several workers wait for each other. Before NumPy is loaded.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import pytest  # noqa: E402
 
 ROOT = Path(__file__).resolve().parents[2]
 STUDY = ROOT / "studies" / "planar_arm"

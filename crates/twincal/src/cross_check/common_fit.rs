@@ -112,25 +112,63 @@ impl CommonFit {
 
     /// Sum of squares with the torque of one of these logs turned, over that as it is.
     pub(super) fn turned(&self, logs: &[usize]) -> Vec<f64> {
-        let (right, square) = self.right();
-        let left = |right: &[f64], square: f64| {
-            let mut solution = right.to_vec();
-            self.matrix.solve(&mut solution);
-            square - dot(right, &solution)
-        };
-        let as_it_is = left(&right, square);
+        let so_far = self.right();
+        let as_it_is = self.left_of(&so_far);
         let of = |log: &usize| {
-            let (mut right, mut square) = (right.clone(), square);
-            for own in self.rows.iter().filter(|own| own.block.log == *log) {
-                let turn = -2.0 * own.weight * own.weight / own.factor;
-                for (&k, tau) in own.block.columns.iter().zip(&own.right[0]) {
-                    right[k] += turn * tau;
-                }
-                square -= 2.0 * turn * own.squares[1];
+            let mut changed = so_far.clone();
+            for own in &self.rows[self.rows_of(Some(*log))] {
+                let turn = |of: &[f64]| of.iter().map(|tau| -2.0 * tau).collect::<Vec<f64>>();
+                own.change(
+                    &mut changed,
+                    (&turn(&own.right[0]), -2.0 * own.squares[1], 0.0),
+                );
             }
-            left(&right, square) / as_it_is
+            self.left_of(&changed) / as_it_is
         };
         logs.iter().map(of).collect()
+    }
+
+    /// The two joints of a log which exchange their torque with the least squares left, and by how much these fall.
+    pub(super) fn exchange(&self, log: usize) -> Option<([usize; 2], f64)> {
+        let so_far = self.right();
+        let as_it_is = self.left_of(&so_far);
+        let own = self.rows_of(Some(log));
+        let pairs = own
+            .clone()
+            .flat_map(|a| (a + 1..own.end).map(move |b| (a, b)));
+        let gains = pairs.map(|(a, b)| {
+            let mut changed = so_far.clone();
+            let [a, b] = [&self.rows[a], &self.rows[b]];
+            a.replace(&mut changed, &b.block.measured);
+            b.replace(&mut changed, &a.block.measured);
+            let joints = [a.block.joint, b.block.joint];
+            (joints, as_it_is - self.left_of(&changed))
+        });
+        gains.max_by(|one, other| one.1.total_cmp(&other.1))
+    }
+
+    /// Exchanges the torque of two joints of a log, and fits again.
+    pub(super) fn swap(&mut self, log: usize, joints: [usize; 2]) {
+        let place = |joint: usize| {
+            let is_it = |own: &Rows| own.block.log == log && own.block.joint == joint;
+            self.rows.iter().position(is_it)
+        };
+        let [Some(a), Some(b)] = joints.map(place) else {
+            return;
+        };
+        let first = std::mem::take(&mut self.rows[a].block.measured);
+        self.rows[a].block.measured = std::mem::replace(&mut self.rows[b].block.measured, first);
+        for own in [a, b] {
+            self.rows[own].sum();
+        }
+        self.solve();
+    }
+
+    /// What a right side and a sum of squares leave of the latter.
+    fn left_of(&self, (right, square): &(Vec<f64>, f64)) -> f64 {
+        let mut solution = right.clone();
+        self.matrix.solve(&mut solution);
+        square - dot(right, &solution)
     }
 
     /// Right side of the normal equations and sum of squares.
@@ -180,6 +218,12 @@ impl CommonFit {
         places.sort_unstable();
         places.dedup();
         places
+    }
+
+    /// Sum of squares in the blocks for which `which` holds.
+    pub(super) fn squares(&self, which: impl Fn(&Block) -> bool) -> f64 {
+        let own = self.rows.iter().filter(|own| which(&own.block));
+        own.map(|own| dot(&own.residual, &own.residual)).sum()
     }
 
     /// Share of torque's sum of squares about friction that is left in the blocks for which `which` holds.
@@ -388,6 +432,31 @@ impl Rows {
                 self.gram[j * count + i] = product;
             }
         }
+    }
+
+    /// Changes a right side and a sum of squares: by what is added to the products of torque with the columns, with that of the model, and to its square.
+    fn change(
+        &self,
+        (right, square): &mut (Vec<f64>, f64),
+        (columns, nominal, own): (&[f64], f64, f64),
+    ) {
+        let (w, s) = (self.weight * self.weight, 1.0 / self.factor);
+        for (&k, change) in self.block.columns.iter().zip(columns) {
+            right[k] += w * s * change;
+        }
+        *square += w * s * (s * own - 2.0 * nominal);
+    }
+
+    /// The same for this torque instead of that which was measured.
+    fn replace(&self, sums: &mut (Vec<f64>, f64), torque: &[f64]) {
+        let mut tau = torque.to_vec();
+        self.project(&mut tau);
+        let before = self.right[0].iter().enumerate();
+        let columns: Vec<f64> = before
+            .map(|(k, before)| dot(self.block.column(k), &tau) - before)
+            .collect();
+        let nominal = dot(&self.block.nominal, &tau) - self.squares[1];
+        self.change(sums, (&columns, nominal, dot(&tau, &tau) - self.squares[0]));
     }
 
     /// Takes what friction explains away; rows that are not live become 0.

@@ -1,4 +1,4 @@
-//! Torque of one log or one joint that is scaled, turned, or on a clock of its own, by a common fit of all logs and joints.
+//! Torque of one log or one joint that is scaled, turned, exchanged, or on another clock, by a common fit of all logs and joints.
 
 use super::common_fit::{CommonFit, Effect, Fitted};
 use super::excerpt::Excerpt;
@@ -24,6 +24,8 @@ const LEFT: f64 = 0.3;
 /// Sum of squares with a log turned, over that as it is, below which it is turned. LuGre friction leaves 0.33 of a turned log; of logs that are as they
 /// should be the least is 1.16 (a double pendulum; simulated arms 2.4).
 const TURNED: f64 = 0.5;
+/// Squares of two joints with their torque exchanged, over those as it is, below which it is exchanged in a log.
+const EXCHANGED: f64 = 0.25;
 /// Factors that are looked for one after the other, and steps to each.
 const MOST: usize = 3;
 const STEPS: usize = 12;
@@ -113,6 +115,7 @@ impl Whose {
 /// | finding | what was seen |
 /// |---|---|
 /// | `log_torque_factor` | torque of a log, or of one joint in it, is larger or smaller by a factor than the other logs' fit, or turned |
+/// | `log_torque_exchanged` | two joints of a log have each other's torque |
 /// | `joint_torque_factor` | torque of a joint is, by what the other joints say of the links that it moves |
 /// | `log_torque_lag` | torque of a log is late or early, that of the others is not |
 /// | `clock_drift` | the lag of torque behind the motion grows over the log |
@@ -132,6 +135,12 @@ pub fn odd_torque(robot: &Robot, logs: &[Compared<'_>], signs_are_right: bool) -
         joints: robot.joint_names(),
     };
     let mut findings = Vec::new();
+    for _ in 0..MOST {
+        let Some((log, joints, explained)) = next_exchange(&mut fit) else {
+            break;
+        };
+        findings.push(names.exchange(log, joints, explained));
+    }
     for _ in 0..MOST {
         let Some((whose, factor, sd)) = next_factor(&mut fit, signs_are_right) else {
             break;
@@ -193,6 +202,28 @@ fn late(fit: &CommonFit, names: &Names<'_>) -> Option<Finding> {
     let judged = fit.judged(Some(log), |own| lagging(own, log))?;
     let clear = judged.z() > CLEAR && judged.explains > EXPLAINS_LAG;
     clear.then(|| names.lag(log, lag, judged.sd))
+}
+
+/// The log and its two joints whose torque is exchanged there, and the shares of it that are explained before and after; the fit then has it exchanged.
+fn next_exchange(fit: &mut CommonFit) -> Option<(usize, [usize; 2], [f64; 2])> {
+    let logs = fit.logs();
+    let several = logs.len() > 1;
+    let all = logs.into_iter().filter(|_| several);
+    let gains = all.filter_map(|log| fit.exchange(log).map(|(joints, gain)| (log, joints, gain)));
+    let (log, joints, gain) = gains.max_by(|one, other| one.2.total_cmp(&other.2))?;
+    let own = |block: &Block| block.log == log && joints.contains(&block.joint);
+    let of = |fit: &CommonFit| (fit.squares(own), 1.0 - fit.left(own));
+    let (before, explained) = of(fit);
+    if gain < (1.0 - EXCHANGED) * before {
+        return None;
+    }
+    fit.swap(log, joints);
+    let (after, exchanged) = of(fit);
+    if after < EXCHANGED * before && exchanged > 1.0 - LEFT {
+        return Some((log, joints, [explained, exchanged]));
+    }
+    fit.swap(log, joints);
+    None
 }
 
 /// The factor that explains most, which the fit then has; `None` where none is clear.
@@ -342,6 +373,23 @@ impl Names<'_> {
             0,
         )
         .with([("factor", factor), ("factor_sd", sd)])
+    }
+
+    fn exchange(&self, log: usize, joints: [usize; 2], [before, after]: [f64; 2]) -> Finding {
+        let (name, [a, b]) = (self.logs[log], joints.map(|joint| self.joints[joint]));
+        Finding::new(
+            Severity::Warning,
+            Code::LogTorqueExchanged,
+            name,
+            format!(
+                "log `{name}`: joints `{a}` and `{b}` seem to have each other's torque: what the other logs say explains {:.0} % of it, {:.0} % \
+                 exchanged; nothing was changed: rename the torque columns of this log, or leave it out",
+                100.0 * before.max(0.0),
+                100.0 * after
+            ),
+            2,
+        )
+        .with([("explained", after), ("explained_before", before)])
     }
 
     /// What the torque is compared with.

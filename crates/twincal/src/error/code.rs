@@ -242,6 +242,8 @@ codes! {
     LockedFixedJoint = "locked_fixed_joint",
     /// Time is that of the recorder.
     LogTime = "log_time",
+    /// Two joints of one log have each other's torque.
+    LogTorqueExchanged = "log_torque_exchanged",
     /// The torque of one log has another scale than that of the others.
     LogTorqueFactor = "log_torque_factor",
     /// Torque of one log is later or earlier than in the others.

@@ -99,6 +99,7 @@ examples! {
     LockedBeyondLimits: "joint `elbow` is locked at 4, outside its limits -3.14 to 3.14";
     LockedFixedJoint: "joint `flange` is fixed in the model anyway: its locked position 0.5 is not used";
     LogTime: "time on topic `/joint_states` is the recorder's log time, as [columns] time says: it jitters with the network and the recorder's load";
+    LogTorqueExchanged: "log `run3`: joints `elbow` and `wrist` seem to have each other's torque: what the other logs say explains 4 % of it, 98 % exchanged; nothing was changed: rename the torque columns of this log, or leave it out";
     LogTorqueFactor: "log `run3`: measured torque is 1.12 ± 0.02 times what the other logs say of the same robot: look for a gain, gear ratio or torque constant there, and multiply its torque columns by 0.893; a load that not all logs carry looks alike: state `payload` of this [[log]], \"unknown\" if nobody knows it";
     LogTorqueLag: "log `run3`: torque is written 8 ± 1 ms later behind the motion than in the other logs: log it as the others, or move its stamps by that much";
     LogWasFitted: "run1.csv: this log is one that the twin was fitted to: no independent check";

@@ -40,6 +40,7 @@ const TABLE: &[(Code, Severity, Mistake)] = &[
     (Code::ConstantTorque, Degraded, Mistake::NoMeasurement),
     // cross_check
     (Code::CopiedLog, Warning, Mistake::Copy),
+    (Code::LogTorqueExchanged, Warning, Mistake::OddTorque),
     (Code::LogTorqueFactor, Warning, Mistake::OddTorque),
     (Code::JointTorqueFactor, Warning, Mistake::OddTorque),
     (Code::LogTorqueLag, Warning, Mistake::OddTorque),

@@ -182,6 +182,7 @@ table! {
     LockedBeyondLimits: Warning => "high" "low" "position";
     LockedFixedJoint: Note => "position";
     LogTime: Warning => "lag_of_others";
+    LogTorqueExchanged: Warning => "explained" "explained_before";
     LogTorqueFactor: Warning => "factor" "factor_sd";
     LogTorqueLag: Warning => "lag" "lag_sd";
     LogWasFitted: Note =>;

@@ -1,7 +1,7 @@
 //! Torque columns that hold no measurement of their joint: another joint's, or one constant number.
 
 use super::explain::Explained;
-use super::parts::{DRIVEN, Parts, driven};
+use super::parts::{DRIVEN, Parts, driven, needed};
 use super::sample::Sample;
 use crate::error::{Code, Finding, Severity};
 use crate::robot::Robot;
@@ -15,15 +15,27 @@ const CLEARLY_DRIVEN: f64 = 0.5;
 /// Range of a column, as a share of its size, up to which it is constant: resampling rounds.
 const CONSTANT: f64 = 1e-9;
 
-/// Findings on the columns of one log's sample.
-pub(super) fn of_sample(
+/// Findings on the columns of each log's sample.
+pub(super) fn of_samples(
     robot: &Robot,
-    (log, sample): (&str, &Sample),
+    (logs, samples): (&[&str], &[Sample]),
     explained: &[Option<Explained>],
 ) -> Vec<Finding> {
-    let mut findings = copied(robot, log, sample, explained);
-    if (0..robot.dof()).any(|joint| is_constant(sample, joint)) {
-        findings.extend(constant(robot, log, sample, &Parts::of(robot, sample)));
+    let joints = 0..robot.dof();
+    let changes = |joint: usize| {
+        let mut moving = samples
+            .iter()
+            .filter(|own| own.moves[joint].contains(&true));
+        moving.any(|own| !is_constant(own, joint))
+    };
+    let has_drive: Vec<bool> = joints.clone().map(changes).collect();
+    let mut findings = Vec::new();
+    for (&log, sample) in logs.iter().zip(samples) {
+        findings.extend(copied(robot, log, sample, explained));
+        if joints.clone().any(|joint| is_constant(sample, joint)) {
+            let parts = Parts::of(robot, sample);
+            findings.extend(constant(robot, (log, sample, &parts), &has_drive));
+        }
     }
     findings
 }
@@ -73,31 +85,44 @@ fn copied(
     findings
 }
 
-/// Driven joints that move while their torque never changes. A torque of 0 is that of a joint without a drive, where gravity and inertia
-/// nearly cancel in what the model needs for its motion.
-fn constant(robot: &Robot, log: &str, sample: &Sample, parts: &Parts) -> Vec<Finding> {
+/// Joints that move while their torque never changes. Of a joint that has a drive, as its torque changes in another log, it is no measurement unless
+/// it swings freely there: gravity and inertia cancel. Without such a log a torque of 0 is that of a joint without a drive where they nearly cancel.
+fn constant(
+    robot: &Robot,
+    (log, sample, parts): (&str, &Sample, &Parts),
+    has_drive: &[bool],
+) -> Vec<Finding> {
     let gravity = parts.gravity(robot.description().gravity);
     let names = robot.joint_names();
+    let moved = needed(sample, parts, &gravity, DRIVEN);
     let [driven, clearly] =
         [DRIVEN, CLEARLY_DRIVEN].map(|share| driven(sample, parts, &gravity, share));
     let wrong = (0..names.len()).filter(|joint| is_constant(sample, *joint));
+    let wrong = wrong.filter_map(|joint| {
+        let value = sample.channels[3][joint][0];
+        let size = match (has_drive[joint], value == 0.0) {
+            (true, _) => moved[joint],
+            (false, true) => clearly[joint],
+            (false, false) => driven[joint],
+        };
+        Some((joint, value, size?))
+    });
     wrong
-        .filter_map(|joint| {
-            let without_drive = sample.channels[3][joint][0] == 0.0;
-            let size = if without_drive { clearly[joint] } else { driven[joint] };
-            Some((joint, size?))
-        })
-        .map(|(joint, size)| {
+        .map(|(joint, value, size)| {
+            let elsewhere = match has_drive[joint] {
+                true => " while it changes in other logs and",
+                false => " while",
+            };
             let message = format!(
-                "log `{log}`: the torque of joint `{}` is {} throughout while the model needs {} N·m (sd) for its motion: no measurement; map its \
+                "log `{log}`: the torque of joint `{}` is {} throughout{elsewhere} the model needs {} N·m (sd) for its motion: no measurement; map its \
                  torque in [columns] tau, or leave this log out",
                 names[joint],
-                significant(sample.channels[3][joint][0], 3),
+                significant(value, 3),
                 significant(size, 2)
             );
             let count = sample.len as u64;
             Finding::new(Severity::Degraded, Code::TorqueConstant, names[joint], message, count)
-                .with([("torque", sample.channels[3][joint][0]), ("torque_needed_sd", size)])
+                .with([("torque", value), ("torque_needed_sd", size)])
         })
         .collect()
 }

@@ -116,7 +116,8 @@ pub fn look<'a>(
     let read = Read::of(robot, &sample, &as_logged);
     let mut findings = read.findings(robot, &as_logged);
     let each = || logs.iter().copied().zip(&samples);
-    findings.extend(each().flat_map(|log| columns::of_sample(&read.robot, log, &read.standing)));
+    let columns = (&logs[..], &samples[..]);
+    findings.extend(columns::of_samples(&read.robot, columns, &read.standing));
     findings.extend(velocity::findings(each()));
     let mut scales = scales(robot, &sample, &read.explained);
     let of_all = scales.iter().any(|scale| scale.finding.subject.is_empty());

@@ -82,32 +82,42 @@ pub(super) fn payload(robot: &Robot, sample: &Sample) -> Vec<[Torques; 2]> {
 
 /// Standard deviation of the torque that each joint's motion needs by the model; `None` for joints that hardly move, or swing freely: less
 /// than this `share` of the variances of gravity and inertia is left of their sum.
+pub(super) fn needed(
+    sample: &Sample,
+    parts: &Parts,
+    gravity: &Torques,
+    share: f64,
+) -> Vec<Option<f64>> {
+    let of_joint = |joint: usize| {
+        let [sum, parts] = variances(sample, [&gravity[joint], &parts.inertia[joint]], joint);
+        (sum > share * parts).then(|| sum.sqrt())
+    };
+    (0..gravity.len()).map(of_joint).collect()
+}
+
+/// The same of joints whose torque is not too small to tell.
 pub(super) fn driven(
     sample: &Sample,
     parts: &Parts,
     gravity: &Torques,
     share: f64,
 ) -> Vec<Option<f64>> {
-    let sizes: Vec<[f64; 2]> = (0..gravity.len())
-        .map(|joint| {
-            let rows: Vec<usize> = (0..sample.len)
-                .filter(|&i| sample.moves[joint][i])
-                .collect();
-            if rows.len() < FEWEST {
-                return [0.0; 2];
-            }
-            let (g, m) = (&gravity[joint], &parts.inertia[joint]);
-            let size = |part: &dyn Fn(usize) -> f64| spread(rows.iter().map(|&i| part(i)));
-            let (g_size, m_size) = (size(&|i| g[i]), size(&|i| m[i]));
-            [size(&|i| g[i] + m[i]), g_size + m_size]
-        })
-        .collect();
-    let largest = sizes.iter().fold(0.0_f64, |most, [sum, _]| most.max(*sum));
-    let is_driven = |[sum, parts]: [f64; 2]| sum > share * parts && sum > SAYS * SAYS * largest;
-    let sizes = sizes.into_iter();
-    sizes
-        .map(|size| is_driven(size).then(|| size[0].sqrt()))
-        .collect()
+    let largest = needed(sample, parts, gravity, 0.0).into_iter().flatten();
+    let least = SAYS * largest.fold(0.0, f64::max);
+    let needed = needed(sample, parts, gravity, share).into_iter();
+    needed.map(|sd| sd.filter(|sd| *sd > least)).collect()
+}
+
+/// Variance of gravity and inertia together, and the sum of theirs, while a joint moves.
+fn variances(sample: &Sample, [gravity, inertia]: [&[f64]; 2], joint: usize) -> [f64; 2] {
+    let moves = &sample.moves[joint];
+    let rows: Vec<usize> = (0..sample.len).filter(|&i| moves[i]).collect();
+    if rows.len() < FEWEST {
+        return [0.0; 2];
+    }
+    let of = |part: &dyn Fn(usize) -> f64| spread(rows.iter().map(|&i| part(i)));
+    let sum = of(&|i| gravity[i]) + of(&|i| inertia[i]);
+    [of(&|i| gravity[i] + inertia[i]), sum]
 }
 
 fn spread(values: impl Iterator<Item = f64> + Clone) -> f64 {

@@ -290,6 +290,35 @@ fn torque_columns_that_are_no_measurement_are_named() {
     );
 }
 
+/// The last link is so light that its torque alone does not say whether its joint has a drive.
+#[test]
+fn a_torque_of_zero_is_no_measurement_where_another_log_shows_a_drive() {
+    let mut description = arm(1.15).description().clone();
+    let light = description.links[4].inertia.as_mut().unwrap();
+    light.mass *= 1e-5;
+    let elements = light.tensor.iter_mut().flatten();
+    elements.for_each(|element| *element *= 1e-5);
+    let robot = Robot::new(description, &Default::default()).unwrap().0;
+    let mut logs = [0.0, 3.1].map(|seed| log_of(&robot, seed));
+    let said = |logs: &[Trajectory]| -> Vec<String> {
+        let found = self_check(&robot, &pipeline(), logs).unwrap();
+        let constant = found.iter().filter(|own| own.code == Code::TorqueConstant);
+        constant.map(|own| own.message.clone()).collect()
+    };
+    for joint in 0..4 {
+        let kept = logs[1].clone();
+        rows(&mut logs[1].segments[0].tau, joint).fill(0.0);
+        let found = said(&logs);
+        let place = format!(
+            "joint `j{}` is 0.00 throughout while it changes in other logs",
+            joint + 1
+        );
+        assert!(found.len() == 1 && found[0].contains(&place), "{found:?}");
+        logs[1] = kept;
+    }
+    assert!(said(&logs).is_empty());
+}
+
 /// A recording of the arm's log, its torque changed.
 fn recording(change: impl Fn(&mut [f64])) -> crate::signal::Recording {
     let log = log(0.0);

@@ -1,4 +1,4 @@
-//! Planted factors, signs and drifts on a simulated arm that is 15 % heavier than its model: each is named with its size, and good logs are passed in silence.
+//! Planted factors, signs, exchanges and drifts on a simulated arm that is 15 % heavier than its model: each is named with its size, and good logs are passed in silence.
 
 use super::*;
 use crate::self_check::testing::{INTERVAL, LEN, arm, leaning_and_loaded, log, log_of};
@@ -148,6 +148,29 @@ fn a_joint_whose_torque_is_scaled_or_turned_in_one_log_is_named_with_both() {
             assert_eq!(places(&found), [("log_torque_factor", "run1")], "{found:?}");
             assert!(found[0].message.contains("joint `j3`"), "{found:?}");
             assert!((said_factor(&found[0]) - factor).abs() < 0.04, "{found:?}");
+        }
+    }
+}
+
+#[test]
+fn joints_that_have_each_others_torque_in_one_log_are_named_in_any_of_three() {
+    for joints in [[0, 1], [1, 2], [2, 3], [1, 3]] {
+        for odd in 0..3 {
+            let mut logs = logs(odd, 3);
+            let odd = odd as usize;
+            let [first, second] = joints.map(|joint| torque(&mut logs[odd], joint).to_vec());
+            torque(&mut logs[odd], joints[0]).copy_from_slice(&second);
+            torque(&mut logs[odd], joints[1]).copy_from_slice(&first);
+            let found = said(&logs);
+            let log = format!("run{odd}");
+            assert_eq!(
+                places(&found),
+                [("log_torque_exchanged", &*log)],
+                "{found:?}"
+            );
+            let [a, b] = joints.map(|joint| format!("`j{}`", joint + 1));
+            let words = format!("joints {a} and {b} seem to have each other's torque");
+            assert!(found[0].message.contains(&words), "{found:?}");
         }
     }
 }
