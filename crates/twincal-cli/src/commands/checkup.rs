@@ -93,7 +93,8 @@ pub(super) fn checkup(
     checkup.lags = lags(robot, pipeline, &trajectories);
     if let Some(lags) = &checkup.lags {
         let said = &pipeline.corrections.lag;
-        checkup.findings.extend(lag_findings(said, lags));
+        let late = lag_findings(said, lags, &checkup.findings);
+        checkup.findings.extend(late);
     }
     Ok(checkup)
 }

@@ -109,10 +109,10 @@ impl Votes {
         if agree.common.is_none() {
             several.differs.fill(false);
         }
-        // One log that differs must not pull what is applied to all.
-        let common = match several.differs.contains(&true) {
-            true => agree.common.and(several.common),
-            false => agree.common,
+        // Logs that differ must not pull what is applied to all.
+        let common = match of_logs.len() {
+            0 | 1 => agree.common,
+            _ => agree.common.and(several.common),
         };
         // Of two joints nobody knows which is right, and a log that differs pulls joints apart.
         let alike = joints.len() > 2 && !several.differs.contains(&true);
@@ -211,14 +211,14 @@ impl Lags {
     }
 }
 
-/// Findings on the lags of logs. `said`: what the user said of lags, which was applied before these were estimated.
+/// Findings on the lags of logs, beside those that are `known`. `said`: what the user said of lags, which was applied before these were estimated.
 ///
 /// | what is clear | finding |
 /// |---|---|
 /// | a lag of all joints and logs | a note that it is applied; a warning where the user said another |
 /// | that of one joint | degraded data, its subject is the joint; it is applied |
-/// | that of one log | degraded data, its subject is the log; it is not applied |
-pub fn lag_findings(said: &Lag, lags: &Lags) -> Vec<Finding> {
+/// | that of one log | a warning, `log_torque_lag`; it is not applied |
+pub fn lag_findings(said: &Lag, lags: &Lags, known: &[Finding]) -> Vec<Finding> {
     let mut findings = Vec::new();
     if let Some([lag, sd]) = lags.common.filter(|_| lags.clear) {
         findings.push(common_finding(said, lags, [lag, sd]));
@@ -246,13 +246,17 @@ pub fn lag_findings(said: &Lag, lags: &Lags) -> Vec<Finding> {
             ]),
         );
     }
-    findings.extend(late_logs(lags));
+    findings.extend(late_logs(lags, known));
     findings
 }
 
-/// Findings on logs whose lag differs from that of the others: nothing moves a single log's torque.
-pub fn late_logs(lags: &Lags) -> Vec<Finding> {
-    let late = lags.logs.iter().filter(|log| log.differs);
+/// Findings on logs whose lag differs from that of the others, where none is `known` that says so: nothing moves a single log's torque.
+pub fn late_logs(lags: &Lags, known: &[Finding]) -> Vec<Finding> {
+    let is_known = |log: &LogLag| {
+        let mut known = known.iter();
+        known.any(|own| own.code == Code::LogTorqueLag && own.subject == log.log)
+    };
+    let late = (lags.logs.iter()).filter(|log| log.differs && !is_known(log));
     let finding = |log: &LogLag| {
         let own = log.common?;
         let message = format!(
@@ -261,7 +265,7 @@ pub fn late_logs(lags: &Lags) -> Vec<Finding> {
             behind(own)
         );
         Some(
-            Finding::new(Severity::Degraded, Code::TorqueLag, &log.log, message, 0)
+            Finding::new(Severity::Warning, Code::LogTorqueLag, &log.log, message, 0)
                 .with([("lag", own[0]), ("lag_sd", own[1])]),
         )
     };

@@ -52,7 +52,7 @@ fn case_17_a_planted_lag_comes_back_in_parts_of_a_sample() {
             );
             assert_eq!(found.clear, lag != 0.0, "{found:#?}");
             assert!(found.joints.iter().all(|joint| !joint.differs));
-            let said = lag_findings(&Lag::Unsaid, &found);
+            let said = lag_findings(&Lag::Unsaid, &found, &[]);
             assert_eq!(said.len(), usize::from(lag != 0.0), "{said:?}");
             assert!(
                 said.iter()
@@ -77,7 +77,7 @@ fn friction_that_remembers_is_no_lag() {
         let found = found(&[&trajectory]);
         let [mean, _] = found.common.unwrap();
         assert!(mean.abs() < 1e-3 && !found.clear, "{found:#?}");
-        assert_eq!(lag_findings(&Lag::Unsaid, &found), []);
+        assert_eq!(lag_findings(&Lag::Unsaid, &found, &[]), []);
     }
 }
 
@@ -90,7 +90,7 @@ fn a_base_that_leans_under_an_unknown_payload_is_no_lag() {
             let found = found(&[&log_of(&robot, f64::from(seed) * 3.1)]);
             let [mean, _] = found.common.unwrap();
             assert!(mean.abs() < 1e-3 && !found.clear, "{degrees}: {found:#?}");
-            assert_eq!(lag_findings(&Lag::Unsaid, &found), []);
+            assert_eq!(lag_findings(&Lag::Unsaid, &found, &[]), []);
         }
     }
 }
@@ -105,7 +105,7 @@ fn one_joint_that_is_late_is_named_and_moved_alone() {
             .collect();
         let name = format!("j{}", joint + 1);
         assert_eq!(differ, [&*name], "{found:#?}");
-        let said = &lag_findings(&Lag::Unsaid, &found)[0];
+        let said = &lag_findings(&Lag::Unsaid, &found, &[])[0];
         assert_eq!(
             (said.severity, &*said.subject),
             (Severity::Degraded, &*name)
@@ -139,14 +139,34 @@ fn one_log_that_is_late_is_named_and_moves_no_other() {
     let differ: Vec<bool> = found.logs.iter().map(|log| log.differs).collect();
     assert_eq!(differ, [true, false, false], "{found:#?}");
     assert!(!found.clear && found.correction(&arm(1.0)).is_none());
-    let said = &lag_findings(&Lag::Unsaid, &found)[0];
-    assert_eq!((said.severity, &*said.subject), (Severity::Degraded, "a"));
+    let said = lag_findings(&Lag::Unsaid, &found, &[]);
+    let [own] = &said[..] else {
+        panic!("{said:?}");
+    };
+    assert_eq!((own.code, &*own.subject), (Code::LogTorqueLag, "a"));
+    assert!(own.forbids_yes());
+    // What another check said of it already is not said again.
+    assert_eq!(lag_findings(&Lag::Unsaid, &found, &said), []);
+}
+
+/// 0, 40 and 80 ms: no two logs agree, so that nothing is applied to all.
+#[test]
+fn logs_that_disagree_have_no_common_lag() {
+    let all = [0, 1, 2, 3];
+    let mut logs = [0.0, 3.1, 6.2].map(log);
+    for (k, log) in logs.iter_mut().enumerate() {
+        log.name = format!("run{k}");
+        delay(log, &all, &|_| 8.0 * k as f64);
+    }
+    let found = found(&logs.each_ref());
+    assert!(found.common.is_none() && !found.clear, "{found:#?}");
+    assert!(found.correction(&arm(1.0)).is_none());
 }
 
 #[test]
 fn a_lag_beside_the_one_that_was_said_is_a_warning() {
     let found = found(&[&late(0.0, &[0, 1, 2, 3], 4.0)]);
-    let said = lag_findings(&Lag::All(0.0), &found);
+    let said = lag_findings(&Lag::All(0.0), &found, &[]);
     assert_eq!(said[0].severity, Severity::Warning);
 }
 

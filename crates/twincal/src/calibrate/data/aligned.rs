@@ -35,7 +35,8 @@ pub(in crate::calibrate) fn align<'a>(
     let Some(lag) = found.correction(robot) else {
         return Ok(Some(found));
     };
-    findings.extend(lag_findings(&pipeline.corrections.lag, &found));
+    let said = lag_findings(&pipeline.corrections.lag, &found, findings);
+    findings.extend(said);
     pipeline.corrections.lag = lag;
     for (log, prepared) in logs.iter().zip(prepared) {
         if matches!(prepared, ReadyLog::Whole(_)) {
@@ -57,9 +58,9 @@ pub(in crate::calibrate) fn of_every_log(
     let found = lags(robot, pipeline, &all)?;
     let said = &settings.signal.corrections.lag;
     if *said == Lag::Unsaid {
-        findings.extend(late_logs(&found));
+        findings.extend(late_logs(&found, findings));
         return None;
     }
-    findings.extend(lag_findings(said, &found));
+    findings.extend(lag_findings(said, &found, findings));
     Some(found)
 }
