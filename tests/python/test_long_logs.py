@@ -65,12 +65,12 @@ def log(minutes, seed=1):
     return pa.table(columns)
 
 
-def run(*command, threads=2):
+def run(*command, threads=2, code=0):
     """What a command prints, and the largest memory that it took, MB."""
     command = [program("twincal"), *map(str, command), "--threads", str(threads)]
     # Through a small process: the largest memory of a child counts what its parent had when it was started.
     done = subprocess.run([sys.executable, "-c", MEASURED, *command], capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
+    assert done.returncode == code, done.stderr
     memory, _, words = done.stdout.partition("\n")
     return words, float(memory)
 
@@ -143,7 +143,8 @@ def test_all_commands_take_long_logs_in_chapters(tmp_path, long_log):
                         ["check", file, "--twin", tmp_path / "out", "--json"],
                         ["inspect", model, file, "--config", config, "--json"],
                         ["doctor", file, "--model", model, "--config", config, "--json"]):  # fmt: skip
-            words, memory[command[0], file.stem] = run(*command, threads=1)
+            known = command[0] == "check" and file == long  # the log of the fit is no evidence: inconclusive
+            words, memory[command[0], file.stem] = run(*command, threads=1, code=3 if known else 0)
             if command[0] in ("inspect", "doctor"):
                 (seen,) = json.loads(words)["logs"]
                 assert (seen["samples"], seen["segments"]) == (pa.parquet.read_metadata(file).num_rows, 1)

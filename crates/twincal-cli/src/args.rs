@@ -18,7 +18,7 @@ Examples:
   twincal demo                                        the whole road, offline
   twincal doctor run.csv --model arm.urdf             what is wrong with this log?
   twincal fit run*.csv --model arm.urdf               what does my model miss?
-  twincal check heldout.csv --twin twincal-out        is the twin still right?
+  twincal check today.csv --twin twincal-out          is the twin still right?
   twincal predict run.csv --twin twincal-out -o p.csv torque with intervals
 ";
 

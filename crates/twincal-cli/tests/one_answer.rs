@@ -174,6 +174,102 @@ fn a_check_of_a_log_without_a_measurement_is_inconclusive() {
     assert!(done.out.starts_with("Not yet"), "{}", done.out);
 }
 
+/// Columns of torque that are turned, exchanged or late are no change of the robot; more friction is one.
+#[test]
+fn a_check_of_a_misread_log_is_inconclusive() {
+    let folder = folder();
+    fs::write(folder.path().join("run.csv"), csv(2000, &|_, row| row)).unwrap();
+    fit(folder.path(), &["-o", "out"]);
+    let turned = |columns: &'static [usize]| {
+        csv(2000, &|_, mut row| {
+            let turn = |cell: &String| (-cell.parse::<f64>().unwrap()).to_string();
+            columns.iter().for_each(|&at| row[at] = turn(&row[at]));
+            row
+        })
+    };
+    let exchanged = csv(2000, &|_, mut row| {
+        row.swap(7, 8);
+        row
+    });
+    // Three rows of 20 ms.
+    let before = std::cell::RefCell::new(std::collections::VecDeque::new());
+    let late = csv(2000, &|_, mut row| {
+        let mut before = before.borrow_mut();
+        before.push_back(row[7..].to_vec());
+        let own = if before.len() > 3 {
+            before.pop_front()
+        } else {
+            None
+        };
+        row.splice(7.., own.unwrap_or_else(|| before[0].clone()));
+        row
+    });
+    let friction = csv(2000, &|_, mut row| {
+        let number = |at: usize| row[at].parse::<f64>().unwrap();
+        row[8] = (number(8) + 0.1 * number(4)).to_string();
+        row
+    });
+    let kind = |name: &str| serde_json::json!({"kind": "joint", "name": name});
+    let log = |name: &str| serde_json::json!({"kind": "log", "name": name});
+    for (name, text, answer, code, subject) in [
+        (
+            "turned.csv",
+            turned(&[7, 8]),
+            "not_yet",
+            "sign_flip",
+            log("turned.csv"),
+        ),
+        (
+            "elbow.csv",
+            turned(&[8]),
+            "not_yet",
+            "sign_flip",
+            kind("elbow"),
+        ),
+        (
+            "order.csv",
+            exchanged,
+            "not_yet",
+            "joint_order",
+            log("order.csv"),
+        ),
+        (
+            "late.csv",
+            late,
+            "not_yet",
+            "log_torque_lag",
+            log("late.csv"),
+        ),
+        (
+            "rough.csv",
+            friction,
+            "no",
+            "error_above_gate",
+            kind("elbow"),
+        ),
+    ] {
+        fs::write(folder.path().join(name), text).unwrap();
+        assert_eq!(verdict_is_the_answer(folder.path(), name), answer, "{name}");
+        let json = run(folder.path(), ["check", name, "--twin", "out", "--json"]);
+        let told: Value = serde_json::from_str(&json.out).unwrap();
+        assert_eq!(told["assessment"]["reason"], code, "{told}");
+        assert_eq!(
+            told["assessment"]["claims"][0]["subject"], subject,
+            "{told}"
+        );
+        assert_eq!(json.code, Some(if answer == "no" { 1 } else { 3 }));
+        let changes = told["changes"].as_array().unwrap().iter();
+        let changed = changes.filter(|change| change["changed"] == true).count();
+        assert_eq!(changed, usize::from(answer == "no"), "{name}");
+        let text = run(folder.path(), ["check", name, "--twin", "out"]);
+        assert!(
+            answer == "no" || !text.out.contains("changed:"),
+            "{}",
+            text.out
+        );
+    }
+}
+
 #[test]
 fn a_good_twin() {
     let folder = folder();

@@ -1,6 +1,7 @@
 //! Which settings hold: `./twincal.toml` is read without being asked for, that is said, and result.json says which file it was.
 #![allow(clippy::unwrap_used, reason = "a broken test may panic")]
 
+use crate::common;
 use crate::common::{QUICK, fitted_copy, folder, run};
 use serde_json::Value;
 use std::fs;
@@ -76,7 +77,8 @@ fn a_broken_config_that_lies_there_is_an_error_at_its_place() {
             .says(&[SAID, "twincal.toml:2:1", "unknown key `cutof`"]);
     }
     // A twin has its own settings, and init may be about to write the file.
-    run(folder.path(), ["check", "run.csv", "--twin", "twin"]).expect(0);
+    common::write_later(folder.path());
+    run(folder.path(), ["check", "later.csv", "--twin", "twin"]).expect(0);
     let init = ["init", "run.csv", "--model", "arm.urdf", "-o", "own.toml"];
     let done = run(folder.path(), init);
     assert_eq!(done.code, Some(0), "{}", done.err);

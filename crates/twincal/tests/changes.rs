@@ -16,19 +16,19 @@ const VELOCITY: f64 = 0.02;
 
 /// What changed: factor on the elbow's friction, kg more at the tip, and by how much the elbow's encoder reads too much, rad.
 #[derive(Clone, Copy)]
-struct Robot {
-    friction: f64,
-    load: f64,
-    zero: f64,
+pub(crate) struct Robot {
+    pub(crate) friction: f64,
+    pub(crate) load: f64,
+    pub(crate) zero: f64,
 }
 
-const SAME: Robot = Robot {
+pub(crate) const SAME: Robot = Robot {
     friction: 1.0,
     load: 0.0,
     zero: 0.0,
 };
 
-fn log(name: &str, phase: f64, seed: u64, robot: Robot) -> Recording {
+pub(crate) fn log(name: &str, phase: f64, seed: u64, robot: Robot) -> Recording {
     let real = two_link::arm(TIP + robot.load).expect("an arm");
     let mut log = two_link::log(name, phase, &real, &mut Random::new(seed, 0));
     let elbow = &mut log.joints[1];
@@ -41,7 +41,7 @@ fn log(name: &str, phase: f64, seed: u64, robot: Robot) -> Recording {
     log
 }
 
-fn fitted() -> Calibration {
+pub(crate) fn fitted() -> Calibration {
     let nominal = two_link::arm(2.0).expect("an arm");
     let mut settings = CalibrationSettings::default();
     settings.library.terms = vec!["sin(q1 - q2)".into()];
@@ -51,10 +51,15 @@ fn fitted() -> Calibration {
     calibrate(&nominal, &[training], &[heldout], &settings, &|_| {}).expect("a calibration")
 }
 
+/// The twin's held-out error of each joint.
+pub(crate) fn errors(twin: &Calibration) -> Vec<f64> {
+    let scores = twin.validation.moving.joints.iter();
+    scores.map(|joint| joint.rmse_calibrated).collect()
+}
+
 /// What a twin says of a log.
 fn changes(twin: &Calibration, log: &Recording) -> Vec<Change> {
-    let scores = twin.validation.moving.joints.iter();
-    let error: Vec<f64> = scores.map(|joint| joint.rmse_calibrated).collect();
+    let error = errors(twin);
     let library = twin.twin.library().expect("a library");
     let mut changes = Changes::new(&twin.twin, &library, &error).expect("columns");
     let (trajectory, _) = twin.twin.align(log).expect("a motion");

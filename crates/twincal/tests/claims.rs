@@ -178,7 +178,7 @@ fn of_a_log_that_is_no_measurement_nothing_is_asked() {
 }
 
 #[test]
-fn gates_decide_before_what_new_logs_are_said_to_be() {
+fn gates_decide_but_not_on_torque_that_is_none() {
     let above = || {
         let subject = Subject::Joint("elbow".into());
         Claim::of_gate(Code::ErrorAboveGate, subject, 2.0, [f64::NAN, 1.0])
@@ -206,16 +206,33 @@ fn gates_decide_before_what_new_logs_are_said_to_be() {
         subjects,
         [Subject::Run, log, Subject::Joint("elbow".into())]
     );
-    assert_eq!(
-        of(vec![above()], &flipped),
-        (Answer::No, Code::ErrorAboveGate)
-    );
     assert_eq!(of(Vec::new(), &flipped), (Answer::NotYet, Code::SignFlip));
-    // Torque that nobody measured says nothing of the robot.
-    for code in [Code::TorqueConstant, Code::TorqueCopied] {
-        let dead = [Finding::new(Severity::Degraded, code, "elbow", "", 0)];
-        assert_eq!(of(vec![above()], &dead), (Answer::NotYet, code));
+    // Torque that is not what it is said to be says nothing of the robot.
+    for code in [
+        Code::TorqueConstant,
+        Code::TorqueCopied,
+        Code::SignFlip,
+        Code::JointOrder,
+        Code::LogTorqueLag,
+    ] {
+        let wrong = [Finding::new(Severity::Degraded, code, "elbow", "", 0)];
+        assert_eq!(of(vec![above()], &wrong), (Answer::NotYet, code));
     }
+    // A motion that is wrong for a while, or a log that is no news, does not excuse a gate that fails; without one it decides.
+    for code in [Code::EncoderStuck, Code::LogWasFitted, Code::LogWasHeldout] {
+        let found = [Finding::new(Severity::Warning, code, "new.csv", "", 0)];
+        let failed = (Answer::No, Code::ErrorAboveGate);
+        assert_eq!(of(vec![above()], &found), failed);
+        assert_eq!(of(Vec::new(), &found), (Answer::NotYet, code));
+    }
+    let beside_new = [Finding::new(
+        Severity::Note,
+        Code::LogWasFitted,
+        "old.csv",
+        "",
+        0,
+    )];
+    assert_eq!(of(Vec::new(), &beside_new), (Answer::Yes, Code::Passed));
     assert_eq!(of(Vec::new(), &[]), (Answer::Yes, Code::Passed));
     let short = vec![Claim::of_run(Code::TooShortToCheck)];
     assert_eq!(of(short, &[]), (Answer::NotYet, Code::TooShortToCheck));

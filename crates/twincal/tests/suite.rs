@@ -17,6 +17,7 @@ mod layers;
 mod library;
 mod long_logs;
 mod many_logs;
+mod misread;
 mod payloads;
 mod products;
 mod properties;

@@ -91,8 +91,7 @@ pub(super) fn run(flags: &Check, terminal: &mut Terminal) -> Outcome<u8> {
     let mut found = std::mem::take(&mut logs.findings);
     // A gate that the config does not give stays as the twin was fitted with.
     let gates = config.gates_over(stored.gates)?;
-    let least = least_share(gates.rmse_ratio);
-    let scored = score(&stored, &logs, least, &mut found);
+    let scored = score(&stored, &logs, gates.rmse_ratio, &mut found);
     let (validation, changes) = scored.map_err(|error| logs.as_given(error))?;
     drop(progress);
     require_strict(settings.log.strict, &found)?;
@@ -101,7 +100,7 @@ pub(super) fn run(flags: &Check, terminal: &mut Terminal) -> Outcome<u8> {
     let fitted = was_fitted.count() == logs.files.len();
     let own = Own::of(&stored, gates, fitted);
     let mut gates = judge(&validation, &own);
-    gates.extend(changes::gates(&changes, least));
+    gates.extend(changes::gates(&changes, least_share(own.gates.rmse_ratio)));
     found.splice(0..0, known.iter().cloned());
     let names: Vec<&str> = logs.logs.iter().map(|log| log.name()).collect();
     let assessment = assessment(&gates, &found, (&stored.calibration, &names));
@@ -120,9 +119,9 @@ pub(super) fn run(flags: &Check, terminal: &mut Terminal) -> Outcome<u8> {
     } else {
         decisive(&gates, assessment.reason, &mut found, terminal);
     }
-    known
-        .iter()
-        .for_each(|finding| paragraph(&finding.message, terminal));
+    // One that is a warning is among the findings.
+    let notes = known.iter().filter(|own| own.severity == Severity::Note);
+    notes.for_each(|finding| paragraph(&finding.message, terminal));
     scores(gates, &validation, terminal);
     terminal.say("");
     findings(&found, Notes::In("the output of --json"), terminal);
@@ -163,11 +162,14 @@ fn scores(gates: Vec<Gate>, validation: &Validation, terminal: &mut Terminal) {
     let (of_changes, of_joints): (Vec<Gate>, Vec<Gate>) =
         gates.into_iter().partition(changes::is_change);
     judged(&of_joints, validation, terminal);
-    let tested = format!(
-        "Changes tested: {} (friction of each joint, payload, joint zeros). An unchanged robot fails with probability {} % at most.",
-        of_changes.len(),
-        100.0 * FALSE_ALARM
-    );
+    let tested = match of_changes.len() {
+        0 => "No change was tested.".to_owned(),
+        count => format!(
+            "Changes tested: {} (friction of each joint, payload, joint zeros). An unchanged robot fails with probability {} % at most.",
+            count,
+            100.0 * FALSE_ALARM
+        ),
+    };
     paragraph(&tested, terminal);
     if let Some(text) = beyond(validation) {
         paragraph(&text, terminal);
@@ -245,10 +247,17 @@ pub(super) fn role_in_fit<'a>(file: &FileHash, stored: &'a StoredTwin) -> Option
     Some(log.role.as_str())
 }
 
-/// Logs that the twin knows already, by their checksums: what they show is no news.
+/// Logs that the twin knows already, by their checksums: what they show is no news. Where no log is new it is a warning, and no pass.
 fn known_logs(files: &[FileHash], stored: &StoredTwin) -> Vec<Finding> {
-    let told = |file: &FileHash| {
-        let (code, what) = match role_in_fit(file, stored)? {
+    let roles: Vec<Option<&str>> = (files.iter())
+        .map(|file| role_in_fit(file, stored))
+        .collect();
+    let (severity, remedy) = match roles.iter().all(Option::is_some) {
+        true => (Severity::Warning, "; check a log that is new to the twin"),
+        false => (Severity::Note, ""),
+    };
+    let known = |(file, role): (&FileHash, &Option<&str>)| {
+        let (code, what) = match (*role)? {
             "heldout" => (
                 Code::LogWasHeldout,
                 "one that the twin was judged by when it was fitted: it repeats those scores",
@@ -258,10 +267,10 @@ fn known_logs(files: &[FileHash], stored: &StoredTwin) -> Vec<Finding> {
                 "one that the twin was fitted to: no independent check",
             ),
         };
-        let message = format!("{}: this log is {what}", file.name);
-        Some(Finding::new(Severity::Note, code, &file.name, message, 0))
+        let message = format!("{}: this log is {what}{remedy}", file.name);
+        Some(Finding::new(severity, code, &file.name, message, 0))
     };
-    files.iter().filter_map(told).collect()
+    files.iter().zip(&roles).filter_map(known).collect()
 }
 
 /// What the gates judge joint by joint, and what stands beside it.
@@ -362,11 +371,12 @@ fn beyond(validation: &Validation) -> Option<String> {
     ))
 }
 
-/// Scores of all logs together, and what they say of changes; `least`: share of the error from which on one matters.
+/// Scores of all logs together, and what they say of changes but for logs that are not what they are said to be; `ratio`: of a joint's error to the
+/// twin's, above which a gate fails.
 fn score(
     stored: &StoredTwin,
     logs: &LogInput,
-    least: f64,
+    ratio: f64,
     findings: &mut Vec<Finding>,
 ) -> Result<(Validation, Vec<Change>)> {
     let twin = &stored.calibration.twin;
@@ -378,16 +388,24 @@ fn score(
     let mut changes = Changes::new(twin, &library, &errors)?;
     for log in &logs.logs {
         let each = (twin, &library, &predictor);
-        let mut columns = None;
+        let (mut columns, mut own) = (None, changes.alone());
         scores.score(each, log, findings, &mut |motion| {
             if columns.is_none() {
                 columns = Some(no_measurement(twin, motion)?);
             }
-            changes.take(motion)
+            own.take(motion)
         })?;
-        findings.extend(columns.into_iter().flatten());
+        let mut said = columns.unwrap_or_default();
+        if said.is_empty() {
+            said = own.misread(log.name(), ratio);
+        }
+        if said.is_empty() {
+            changes.join(own);
+        }
+        findings.extend(said);
     }
-    Ok((scores.finish(Split::HeldoutLogs), changes.finish(least)))
+    let changes = changes.finish(least_share(ratio));
+    Ok((scores.finish(Split::HeldoutLogs), changes))
 }
 
 /// Torque columns of a log that hold another joint's torque, or one number: what they say of the robot is nothing.

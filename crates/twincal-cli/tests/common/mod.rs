@@ -96,6 +96,15 @@ fn fill(folder: &Path) {
     std::fs::write(folder.join("quick.toml"), QUICK).unwrap();
 }
 
+/// Writes `later.csv`: the robot of `run.csv` some time later, which no twin of these tests was fitted to.
+pub(crate) fn write_later(folder: &Path) {
+    let both = csv(1000, &|_, row| row);
+    let rows = both.lines().enumerate();
+    let later = rows.filter(|(number, _)| *number == 0 || *number > 500);
+    let later: String = later.map(|(_, line)| format!("{line}\n")).collect();
+    std::fs::write(folder.join("later.csv"), later).unwrap();
+}
+
 /// `twincal fit run.csv …` with the quick settings.
 pub(crate) fn fit(folder: &Path, more: &[&str]) -> Run {
     let base = [

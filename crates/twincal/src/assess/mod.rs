@@ -73,8 +73,8 @@ impl Assessment {
     }
 }
 
-/// What gates on new `logs` mean for a twin: they decide, and where they hold a mistake in those logs does. Torque that is no measurement of its
-/// joint says nothing of the robot: then that decides, whatever the gates say.
+/// What gates on new `logs` mean for a twin: they decide, and where they hold a mistake in those logs does. Torque that is not what it is said to be
+/// says nothing of the robot ([`Mistake::voids_gates`]): then that decides, whatever the gates say.
 #[must_use]
 pub fn of_gates(
     gates: Vec<Claim>,
@@ -92,7 +92,7 @@ pub fn of_gates(
     let found: Vec<Claim> = found.collect();
     let says_nothing = found.iter().any(|claim| {
         let mistake = Mistake::of(claim.code, claim.severity);
-        mistake == Some(Mistake::NoMeasurement) || claim.code == Code::TorqueCopied
+        mistake.is_some_and(Mistake::voids_gates)
     });
     let mut claims = gates;
     let decided = answer > Answer::YesWithinLimits && !says_nothing;

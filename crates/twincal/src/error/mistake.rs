@@ -10,7 +10,7 @@ pub enum Mistake {
     Contradiction,
     /// Torque is no measurement.
     NoMeasurement,
-    /// A log is a copy of another one.
+    /// A log is one that the twin knows: a copy of another one, or no news.
     Copy,
     /// Torque of one log or joint differs from the others'.
     OddTorque,
@@ -38,6 +38,9 @@ const TABLE: &[(Code, Severity, Mistake)] = &[
     (Code::CommonFactor, Degraded, Mistake::Contradiction),
     // signal/clean/torque.rs; a warning where one joint of several is passive
     (Code::ConstantTorque, Degraded, Mistake::NoMeasurement),
+    // twincal check; a note where another log is new
+    (Code::LogWasFitted, Warning, Mistake::Copy),
+    (Code::LogWasHeldout, Warning, Mistake::Copy),
     // cross_check
     (Code::CopiedLog, Warning, Mistake::Copy),
     (Code::LogTorqueExchanged, Warning, Mistake::OddTorque),
@@ -56,6 +59,15 @@ impl Mistake {
     /// The codes that forbid a "Yes", with the severity from which on each does.
     pub fn codes() -> impl Iterator<Item = (Code, Severity)> {
         TABLE.iter().map(|(code, severity, _)| (*code, *severity))
+    }
+
+    /// Whether the torque of such a log is none that the model and its joints speak of: then no gate on it says anything of the robot.
+    #[must_use]
+    pub const fn voids_gates(self) -> bool {
+        matches!(
+            self,
+            Self::Contradiction | Self::NoMeasurement | Self::OddTorque
+        )
     }
 
     /// The mistake that a finding of this severity speaks of; `None` where a "Yes" may stand beside it.

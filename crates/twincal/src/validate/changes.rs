@@ -10,7 +10,10 @@
 //! with B once what noise of variance σ_j² makes whose rows count as 1/τ_j each, and once the spread of the scores of blocks of rows about δ̂
 //! (Liang & Zeger 1986); the larger doubt counts: Hotelling's T² is compared with χ², and with F for as many blocks as there are.
 
+mod logs;
+
 use super::changed_payload::numbers as numbers_of_payload;
+use super::misread::Readings;
 use crate::error::Result;
 use crate::linear_algebra::{Cholesky, dot};
 use crate::observations::{JointObservations, Observations, observe};
@@ -117,6 +120,7 @@ pub struct Changes<'a> {
     /// σ_j, N·m.
     error: Vec<f64>,
     joints: Vec<JointSums>,
+    readings: Readings,
 }
 
 impl<'a> Changes<'a> {
@@ -144,9 +148,11 @@ impl<'a> Changes<'a> {
             let error = if *error > 0.0 { *error } else { own };
             error.max(LEAST_ERROR)
         });
+        let error: Vec<f64> = error.collect();
         Ok(Self {
             suspects: suspects(&columns, &joints),
-            error: error.collect(),
+            readings: Readings::new(&error),
+            error,
             joints: (0..joints.len()).map(|_| JointSums::default()).collect(),
             columns,
             twin,
@@ -176,14 +182,17 @@ impl<'a> Changes<'a> {
             let nothing = || (vec![0.0; size * size], vec![0.0; size]);
             suspect.blocks.extend((0..count).map(|_| nothing()));
         }
-        for joint in 0..self.joints.len() {
-            let residual = (rows.whole()).residual(joint, &self.twin.posterior.mean, 0..rows.len());
+        let mean = &self.twin.posterior.mean;
+        let residual = |joint| (rows.whole()).residual(joint, mean, 0..rows.len());
+        let residuals: Vec<Vec<f64>> = (0..self.joints.len()).map(residual).collect();
+        self.readings.take(&rows, &residuals);
+        for (joint, residual) in residuals.iter().enumerate() {
             let columns = dense(&changes, joint);
-            self.joints[joint].add(&rows, joint, (&columns, &residual));
+            self.joints[joint].add(&rows, joint, (&columns, residual));
             let own = &changes.joints[joint];
             let weight = self.error[joint].powi(-2);
             for suspect in &mut self.suspects {
-                suspect.add(own, (&columns, &residual), weight, count);
+                suspect.add(own, (&columns, residual), weight, count);
             }
         }
         Ok(())

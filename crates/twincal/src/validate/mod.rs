@@ -4,6 +4,7 @@ mod changed_payload;
 mod changes;
 mod conformal;
 mod heldout;
+mod misread;
 mod moments;
 mod pit;
 mod rivals;

@@ -4,8 +4,11 @@ use super::gates::{Gate, MOVING};
 use crate::terminal::clean;
 use twincal::Code;
 use twincal::term::Family;
-use twincal::validate::{Change, ChangeKind, FALSE_ALARM};
+use twincal::validate::{Change, ChangeKind, ChangeNumber, FALSE_ALARM};
 use twincal::words::significant;
+
+/// Standard deviations from which a number says something alone.
+const CLEAR: f64 = 2.0;
 
 /// One gate per change that these logs could show: passed where an unchanged robot may well look like this, or the change is too small to matter.
 ///
@@ -68,9 +71,13 @@ fn words(change: &Change, [limit, least]: [f64; 2]) -> String {
     let numbers = numbers(change);
     let share = significant(change.share, 2);
     if change.changed {
+        let clear = |own: &ChangeNumber| own.value.abs() >= CLEAR * own.sd;
+        let estimate = match change.numbers.len() > 1 && !change.numbers.iter().any(clear) {
+            true => "Each number alone may be 0; together, without a change, they have",
+            false => "Such an estimate of an unchanged robot has",
+        };
         return format!(
-            "{subject} changed: {numbers}; torque of {share} times the twin's own error. Such an estimate of an unchanged robot has probability \
-             {}, the gate is {}. {remedy}",
+            "{subject} changed: {numbers}; torque of {share} times the twin's own error. {estimate} probability {}, the gate is {}. {remedy}",
             probability(change.chance),
             probability(limit)
         );
@@ -107,7 +114,7 @@ fn numbers(change: &Change) -> String {
 }
 
 /// What several numbers have in common, and `viscous +0.15 ± 0.01 N·m·s/rad`.
-fn number(number: &twincal::validate::ChangeNumber) -> (&'static str, String) {
+fn number(number: &ChangeNumber) -> (&'static str, String) {
     let (_, own) = number.name.rsplit_once('.').unwrap_or(("", &number.name));
     let (factor, unit) = match own {
         "encoder_zero" => Family::EncoderZero.told_in(&number.unit),
@@ -136,7 +143,6 @@ fn number(number: &twincal::validate::ChangeNumber) -> (&'static str, String) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use twincal::validate::ChangeNumber;
 
     #[test]
     fn a_payload_has_its_nouns_whichever_parts_are_seen() {
@@ -164,5 +170,44 @@ mod tests {
             of(&[("mass", 1.5), ("com_y", 0.03), ("com_z", -0.01)]),
             "mass +1.50 ± 0.0020 kg, centre of mass y +30.0 ± 2.0 mm, z -10.0 ± 2.0 mm"
         );
+    }
+
+    #[test]
+    fn numbers_that_are_clear_together_alone_are_said_to_be_so() {
+        let said = |values: &[f64]| {
+            let number = |(name, value): (&str, &f64)| ChangeNumber {
+                name: format!("elbow.{name}"),
+                unit: "N·m".into(),
+                value: *value,
+                sd: 0.1,
+            };
+            let change = Change {
+                kind: ChangeKind::Friction,
+                subject: "elbow".into(),
+                frame: None,
+                numbers: ["viscous", "coulomb"]
+                    .into_iter()
+                    .zip(values)
+                    .map(number)
+                    .collect(),
+                chance: 0.00012,
+                share: 0.8,
+                changed: true,
+            };
+            words(&change, [0.0008, 0.5])
+        };
+        let together = "Each number alone may be 0; together, without a change, they have probability 0.00012, the gate is 0.00080.";
+        assert!(
+            said(&[0.15, 0.14]).contains(together),
+            "{}",
+            said(&[0.15, 0.14])
+        );
+        for clear in [&[0.15, -0.21][..], &[0.15]] {
+            let words = said(clear);
+            assert!(
+                words.contains("Such an estimate of an unchanged robot has probability"),
+                "{words}"
+            );
+        }
     }
 }
