@@ -4,6 +4,7 @@ use std::fmt::Write;
 use std::fs;
 use std::path::Path;
 use twincal::assess::NUMBERS;
+use twincal::error::{FINDING_NUMBERS, FindingNumber};
 use twincal::{Code, Severity};
 use twincal_io::words::{When, remedy};
 
@@ -30,6 +31,24 @@ fn the_page_has_every_number_of_claims() {
     let row = |(name, meaning): &(&str, &str)| format!("| `{name}` | {meaning} |\n");
     let table: String = NUMBERS.iter().map(row).collect();
     let head = "| number | what it is |\n|---|---|\n";
+    assert!(page.contains(&format!("{head}{table}\n")), "{table}");
+}
+
+#[test]
+fn the_page_has_every_number_of_findings() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/codes.md");
+    let page = fs::read_to_string(path).expect("docs/codes.md");
+    let row = |row: &FindingNumber| {
+        let codes: Vec<String> = row.codes.iter().map(|code| format!("`{code}`")).collect();
+        let of = if codes.is_empty() { "" } else { " of " };
+        let (name, unit, meaning) = (row.name, row.unit, row.meaning);
+        format!(
+            "| `{name}`{of}{} | {unit} | {meaning} |\n",
+            codes.join(", ")
+        )
+    };
+    let table: String = FINDING_NUMBERS.iter().map(row).collect();
+    let head = "| number | unit | what it is |\n|---|---|---|\n";
     assert!(page.contains(&format!("{head}{table}\n")), "{table}");
 }
 

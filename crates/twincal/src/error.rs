@@ -4,11 +4,13 @@ mod code;
 mod evidence;
 mod examples;
 mod mistake;
+mod numbers;
 mod table;
 
 pub use code::Code;
 pub use evidence::Evidence;
 pub use mistake::Mistake;
+pub use numbers::{FINDING_NUMBERS, FindingNumber};
 
 use serde::{Deserialize, Serialize};
 
@@ -220,7 +222,7 @@ pub struct Finding {
     pub message: String,
     /// How many samples, rows or elements it concerns; 0 when it does not count anything.
     pub count: u64,
-    /// The numbers of the message by name, in SI units and radians, shares 0 … 1; docs/codes.md has the names of every code.
+    /// The numbers of the message by name, in SI units and radians, shares 0 … 1; [`Code::number`] and docs/codes.md say what each is.
     #[serde(default, skip_serializing_if = "Evidence::is_empty")]
     pub evidence: Evidence,
 }

@@ -1,8 +1,9 @@
 //! The table of what findings hold (`error/table.rs`) and the places of the three crates that make findings say the same.
 
+use crate::size::source::files_below;
 use std::collections::BTreeSet;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use twincal::Code;
 
 /// A token of a source file: comments and white space are left out.
@@ -186,27 +187,27 @@ fn places() -> Vec<Place> {
 /// Paths and texts of the three crates' files.
 fn sources() -> Vec<(String, String)> {
     let crates = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    let mut folders: Vec<_> = ["twincal", "twincal-io", "twincal-cli"]
-        .map(|name| crates.join(name).join("src"))
-        .into();
-    let mut sources = Vec::new();
-    while let Some(folder) = folders.pop() {
-        for entry in fs::read_dir(&folder).expect("a readable source tree") {
-            let path = entry.expect("a readable source tree").path();
-            let name = path.file_stem().unwrap_or_default().to_string_lossy();
-            // Claims have evidence of their own, and `error` defines findings.
-            let skipped = ["assess", "error", "testing", "fixture"].contains(&&*name);
-            if skipped || name.ends_with("tests") {
-                continue;
-            } else if path.is_dir() {
-                folders.push(path);
-            } else if path.extension().is_some_and(|extension| extension == "rs") {
-                let text = fs::read_to_string(&path).expect("a readable source tree");
-                sources.push((path.to_string_lossy().into_owned(), text));
-            }
-        }
-    }
-    sources
+    // Claims have evidence of their own, and `error` defines findings.
+    let skipped = |name: &str| {
+        ["assess", "error", "testing", "fixture"].contains(&name) || name.ends_with("tests")
+    };
+    let of_crate = |name| {
+        let folder = crates.join(name).join("src");
+        let mut files = files_below(&folder);
+        files.retain(|path| {
+            let inside = path.strip_prefix(&folder).expect("a file below the folder");
+            let inside = inside.with_extension("");
+            let mut parts = inside.components();
+            !parts.any(|part| skipped(&part.as_os_str().to_string_lossy()))
+        });
+        files
+    };
+    let files = ["twincal", "twincal-io", "twincal-cli"].map(of_crate);
+    let read = |path: PathBuf| {
+        let text = fs::read_to_string(&path).expect("a readable source tree");
+        (path.to_string_lossy().into_owned(), text)
+    };
+    files.concat().into_iter().map(read).collect()
 }
 
 /// Letters that a template of a message has at least, in the file that makes the finding.

@@ -1,7 +1,7 @@
 //! Arrows go one way: a module of the core uses only modules whose `mod` line stands above its own in lib.rs, no files of
 //! a module use each other in a circle but in those named here, and no part of the core touches files, clocks, the environment or the terminal.
 
-use crate::size::source::blanked;
+use crate::size::source::{blanked, files_below};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -188,42 +188,30 @@ fn the_reader_of_sources_sees_what_it_should() {
 
 /// Every file below `root`; a file that is declared under `#[cfg(test)]` ships nothing.
 fn sources(root: &Path) -> Vec<Source> {
-    let mut folders = vec![root.to_path_buf()];
-    let mut sources = Vec::new();
-    while let Some(folder) = folders.pop() {
-        for entry in fs::read_dir(&folder).expect("a readable source tree") {
-            let path = entry.expect("a readable source tree").path();
-            if path.is_dir() {
-                folders.push(path);
-            } else if path.extension().is_some_and(|extension| extension == "rs") {
-                let inside = path
-                    .strip_prefix(root)
-                    .expect("a readable source tree")
-                    .with_extension("");
-                let mut parts: Vec<String> = inside
-                    .components()
-                    .map(|part| part.as_os_str().to_string_lossy().into_owned())
-                    .collect();
-                parts.retain(|part| part != "mod");
-                let code = blanked(&fs::read_to_string(&path).expect("a readable source tree"));
-                let is_test = parts.iter().any(|part| part.ends_with("tests"));
-                let shipped = if is_test {
-                    String::new()
-                } else {
-                    without_tests(&code)
-                };
-                sources.push(Source {
-                    path,
-                    module: parts[0].clone(),
-                    parts,
-                    code,
-                    shipped,
-                });
-            }
+    let read = |path: PathBuf| {
+        let inside = path.strip_prefix(root).expect("a file below the folder");
+        let inside = inside.with_extension("");
+        let mut parts: Vec<String> = inside
+            .components()
+            .map(|part| part.as_os_str().to_string_lossy().into_owned())
+            .collect();
+        parts.retain(|part| part != "mod");
+        let code = blanked(&fs::read_to_string(&path).expect("a readable source tree"));
+        let is_test = parts.iter().any(|part| part.ends_with("tests"));
+        let shipped = if is_test {
+            String::new()
+        } else {
+            without_tests(&code)
+        };
+        Source {
+            path,
+            module: parts[0].clone(),
+            parts,
+            code,
+            shipped,
         }
-    }
-    sources.sort_by(|a, b| a.path.cmp(&b.path));
-    sources
+    };
+    files_below(root).into_iter().map(read).collect()
 }
 
 fn module_order(lib: &str) -> Vec<String> {

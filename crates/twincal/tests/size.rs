@@ -3,9 +3,9 @@
 #[path = "common/source.rs"]
 pub(crate) mod source;
 
-use source::blanked;
+use source::{blanked, files_below};
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Most lines of a function, from its `fn` to the brace that closes it.
 const FUNCTION: usize = 60;
@@ -16,7 +16,7 @@ fn functions_and_files_are_short() {
     let manifest = Path::new(env!("CARGO_MANIFEST_DIR"));
     let crates = manifest.parent().expect("the folder of all crates");
     let root = crates.parent().expect("the folder of the workspace");
-    let files = [sources(crates), sources(&root.join("fuzz"))].concat();
+    let files = [files_below(crates), files_below(&root.join("fuzz"))].concat();
     assert!(files.len() > 800, "{} files", files.len());
     let mut long = Vec::new();
     for path in files {
@@ -96,24 +96,6 @@ fn sizes(text: &str) -> Vec<String> {
     let all = functions(&code).into_iter();
     all.map(|own| format!("{} {} {}", own.name, own.line, own.lines))
         .collect()
-}
-
-/// All files of Rust below a folder.
-fn sources(root: &Path) -> Vec<PathBuf> {
-    let mut folders = vec![root.to_path_buf()];
-    let mut files = Vec::new();
-    while let Some(folder) = folders.pop() {
-        for entry in fs::read_dir(&folder).expect("a readable source tree") {
-            let path = entry.expect("a readable source tree").path();
-            if path.is_dir() {
-                folders.push(path);
-            } else if path.extension().is_some_and(|extension| extension == "rs") {
-                files.push(path);
-            }
-        }
-    }
-    files.sort();
-    files
 }
 
 /// What is too long in a file, or the file itself.

@@ -31,7 +31,15 @@ pub(super) fn numbers(calibration: &Calibration) -> [Number; 3] {
     [
         Number {
             value: error,
-            label: format!("torque error (RMSE), {}", pooled_unit(calibration)),
+            label: format!(
+                "torque error (RMSE), {}{}",
+                pooled_unit(calibration),
+                if tested {
+                    words::before_calibration(calibration)
+                } else {
+                    ""
+                }
+            ),
         },
         Number {
             value: percent(if tested { scores.coverage95 } else { f64::NAN }),

@@ -7,6 +7,7 @@ use super::{NAMED, family_name, rest, with};
 use twincal::Code;
 use twincal::assess::{Assessment, Claim, has_standstill};
 use twincal::calibrate::{Calibration, ComponentSummary, Status};
+use twincal::robot::JointDescription;
 use twincal::validate::Split;
 
 /// Share of rows at standstill from which what intervals hold there is told apart.
@@ -66,14 +67,22 @@ fn torque_error(assessment: &Assessment, calibration: &Calibration) -> Option<St
         true => "; joints that move",
         false => "",
     };
-    let which = match assessment.claims(Code::UrdfDynamics).next() {
-        Some(_) => format!("{which}; your model without the friction that its file states"),
-        None => which.to_owned(),
-    };
+    let before = before_calibration(calibration);
     let told = change(claim, pooled_unit(calibration));
     Some(format!(
-        "Torque error (RMSE){below} on {split}{which}: {told}."
+        "Torque error (RMSE){below} on {split}{which}{before}: {told}."
     ))
+}
+
+/// What the torque error before calibration is of, behind the error: nothing where the model file states no friction beyond its torque.
+#[must_use]
+pub fn before_calibration(calibration: &Calibration) -> &'static str {
+    let joints = &calibration.twin.robot.description().joints;
+    let stated = |own: &JointDescription| own.unused_damping != 0.0 || own.unused_friction != 0.0;
+    match joints.iter().any(stated) {
+        true => "; before: your model without the friction that its file states",
+        false => "",
+    }
 }
 
 /// The same of torque as it was logged, of moving joints as well, where that is another matter: "Unfiltered, … : 0.959 → 0.373 N·m; there Joint1 has
@@ -272,7 +281,18 @@ fn by_family(effects: &[&ComponentSummary]) -> String {
 mod tests {
     use super::*;
     use crate::words::tests::judged;
-    use twincal::{Code, Finding, Severity};
+    use std::collections::BTreeMap;
+    use twincal::robot::{JointKind, Robot};
+
+    /// The model file states dry friction of one joint.
+    fn states_friction(c: &mut Calibration) {
+        let mut description = c.twin.robot.description().clone();
+        let moving = |own: &&mut JointDescription| own.kind != JointKind::Fixed;
+        let joint = description.joints.iter_mut().find(moving);
+        joint.expect("a moving joint").unused_friction = 0.1;
+        let (robot, _) = Robot::new(description, &BTreeMap::new()).expect("a robot");
+        c.twin.robot = robot;
+    }
 
     /// Standstill rows as many as moving ones: of these the mean square is 4 before and 0.25 after; at rest `still` before and after, joint by joint.
     fn with_standstill(c: &mut Calibration, still: [[f64; 2]; 2]) {
@@ -381,17 +401,10 @@ mod tests {
         let one = judged(|c| {
             let joints = &mut c.validation.filtered.joints;
             (joints[0].rmse_friction, joints[1].rmse_friction) = (Some(0.01), Some(9.0));
-            c.findings = vec![Finding::new(
-                Severity::Note,
-                Code::UrdfDynamics,
-                "elbow",
-                "",
-                0,
-            )];
+            states_friction(c);
         });
-        assert!(
-            one.grounds[0].contains("; your model without the friction that its file states: ")
-        );
+        let said = "; before: your model without the friction that its file states: ";
+        assert!(one.grounds[0].contains(said), "{one:?}");
         assert!(
             one.grounds[1].ends_with("worse on elbow (0.431 → 9.00 N·m); better on one joint."),
             "{one:?}"

@@ -29,6 +29,7 @@ pub(crate) mod units;
 pub(crate) use compact::compact;
 pub use date::utc;
 pub(crate) use family::family_name;
+pub use grounds::before_calibration;
 pub use intervals::drawn_alike;
 #[cfg(feature = "report")]
 pub(crate) use intervals::guarantee;

@@ -130,6 +130,28 @@ fn case_55_an_unknown_compression_is_refused() {
     );
 }
 
+/// Recorded while nothing was published: what the file holds is said, not what could be mapped.
+#[test]
+fn a_bag_without_messages_is_named_with_its_topics() {
+    let none = Bag::new(None).finish();
+    contains(
+        &refused(read_bytes(&none)),
+        &["holds no messages and no topics", "record it again"],
+    );
+    let mut silent = Bag::new(None);
+    silent
+        .topic("/joint_states", Some(JOINT_STATE), "cdr")
+        .topic("/tf", Some("tf2_msgs/msg/TFMessage"), "cdr");
+    contains(
+        &refused(read_bytes(&silent.finish())),
+        &[
+            "holds no messages on its topics: `/joint_states` (sensor_msgs/msg/JointState",
+            "`/tf`",
+            "record it again",
+        ],
+    );
+}
+
 #[test]
 fn case_56_pointers_and_other_files_are_told() {
     let pointer = b"version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n";
@@ -141,7 +163,10 @@ fn case_56_pointers_and_other_files_are_told() {
         &refused(read_bytes(b"t,q1\n0,1\n")),
         &["does not begin as an MCAP file does"],
     );
-    contains(&refused(read_bytes(b"")), &["is empty (0 bytes)"]);
+    contains(
+        &refused(read_bytes(b"")),
+        &["is empty (0 bytes)", "nothing was written to it"],
+    );
     contains(
         &refused(read_bytes(b"\x89MCAP9\r\n and more")),
         &["does not begin as an MCAP file does"],

@@ -47,6 +47,40 @@ fn case_37_a_decimal_comma_is_detected() {
     );
 }
 
+/// Units in the place of names, or in a line below them.
+#[test]
+fn lines_of_units_are_named_as_such() {
+    let text = LogText::moving(2, 200.0, 2.0).csv();
+    let (header, rows) = text.split_once('\n').unwrap();
+    let units = header.split(',').map(|name| match name {
+        "t" => "s",
+        name if name.contains("tau") => "Nm",
+        _ => "rad",
+    });
+    let units = units.collect::<Vec<_>>().join(",");
+    contains(
+        &refused(read(&format!("{units}\n{rows}"))),
+        &[
+            "run.csv:1",
+            "the names of columns are units",
+            "`t,q1,qd1,tau1`",
+        ],
+    );
+    contains(
+        &refused(read(&format!("{header}\n{units}\n{rows}"))),
+        &[
+            "run.csv:2:1",
+            "this line holds no number: `s` in column `t`",
+            "delete it if it holds units",
+        ],
+    );
+    let mixed = text.replacen("\n0.000000,", "\nx,", 1);
+    contains(
+        &refused(read(&mixed)),
+        &["`x` in column `t` is not a number", "fix the cell"],
+    );
+}
+
 #[test]
 fn case_38_marks_line_ends_and_trailing_delimiters_do_no_harm() {
     let log = LogText::moving(2, 200.0, 2.0);

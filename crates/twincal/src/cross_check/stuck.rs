@@ -5,7 +5,7 @@
 
 use crate::error::{Code, Finding, Result, Severity};
 use crate::robot::Robot;
-use crate::signal::{Channels, Log, Recording, median_step};
+use crate::signal::{Channels, Log, Recording, is_plausible_step, median_step};
 use crate::words::significant;
 
 /// Shortest time, s, and fewest samples for which a position is held: repeated samples of a polled stream are shorter.
@@ -36,7 +36,8 @@ struct Held {
     lost: f64,
 }
 
-/// A warning for every joint of every log whose position is held while it moves.
+/// A warning for every joint of every log whose position is held while it moves. Logs whose stamps are in another unit have none: how long
+/// a position is held is not known there.
 ///
 /// # Errors
 /// Of chapters that cannot be read.
@@ -83,7 +84,7 @@ fn finding(log: &str, joint: &str, held: &[Held]) -> Option<Finding> {
 /// Of one joint of a recording.
 fn of_joint(recording: &Recording, channels: &Channels) -> Vec<Held> {
     let (time, q) = (&recording.time[..], &channels.q[..]);
-    let Some(interval) = median_step(time) else {
+    let Some(interval) = median_step(time).filter(|step| is_plausible_step(*step)) else {
         return Vec::new();
     };
     let changes = || q.windows(2).map(|pair| (pair[1] - pair[0]).abs());
@@ -193,7 +194,7 @@ mod tests {
     const INTERVAL: f64 = 0.004;
 
     /// Moves between rests, encoder of 2^18 counts a turn; `change` is made to the positions.
-    fn held(velocity: bool, change: impl Fn(&mut Vec<f64>)) -> Vec<Held> {
+    fn recording(velocity: bool, change: impl Fn(&mut Vec<f64>)) -> Recording {
         let step = std::f64::consts::TAU / 262_144.0;
         let place = |t: f64| {
             let phase = t.rem_euclid(2.0) / 2.0;
@@ -221,15 +222,35 @@ mod tests {
             tau: None,
             temperature: None,
         };
-        let recording = Recording {
+        Recording {
             unfolded: false,
             start_ns: 0,
             name: "run".into(),
             time,
             joints: vec![channels],
             payload: Payload::None,
-        };
+        }
+    }
+
+    /// What is found in it.
+    fn held(velocity: bool, change: impl Fn(&mut Vec<f64>)) -> Vec<Held> {
+        let recording = recording(velocity, change);
         of_joint(&recording, &recording.joints[0])
+    }
+
+    /// Eight samples that repeat last 32 ms: nothing is held. In stamps of milliseconds they last 32 s, and the clock is what is wrong.
+    #[test]
+    fn stamps_in_another_unit_hold_no_position() {
+        let repeated = |q: &mut Vec<f64>| {
+            let kept = q[200];
+            q[200..208].fill(kept);
+        };
+        for velocity in [true, false] {
+            assert!(held(velocity, repeated).is_empty());
+            let mut log = recording(velocity, repeated);
+            log.time.iter_mut().for_each(|t| *t *= 1e3);
+            assert!(of_joint(&log, &log.joints[0]).is_empty(), "{velocity}");
+        }
     }
 
     #[test]

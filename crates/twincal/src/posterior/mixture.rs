@@ -118,6 +118,18 @@ impl pulp::WithSimd for Quantile<'_> {
     }
 }
 
+/// Error in probability with which a quantile is accepted, as a share of the smaller tail; scales of components from `narrowest` to `widest`.
+///
+/// A Halley step cubes the error: 1e-4 of the tail leaves 1e-11 of it where all components are about equally wide.
+#[inline(always)]
+pub(crate) fn accuracy(narrowest: f64, widest: f64) -> f64 {
+    if narrowest > 0.1 * widest {
+        1e-4
+    } else {
+        1e-13
+    }
+}
+
 /// Where a quantile lies.
 struct Bracket {
     /// The components' own quantiles: the least and the largest.
@@ -190,14 +202,7 @@ impl Quantile<'_> {
         // One t with the mixture's mean and second moment is the start.
         let mut y =
             (anchor + mean + (square - mean * mean).max(0.0).sqrt() * standard).clamp(low, high);
-        // A Halley step cubes the error: 1e-4 of the smaller tail leaves 1e-11 of it where all components are about equally wide, and a
-        // step of 1e-5 of the narrowest one leaves 1e-15 of that.
-        let last = probability
-            * if narrowest > 0.1 * widest {
-                1e-4
-            } else {
-                1e-13
-            };
+        let last = probability * accuracy(narrowest, widest);
         let inverses: Vec<f64> = (mixture.scales.iter())
             .map(|scale| 1.0 / scale.max(POINT))
             .collect();
@@ -215,6 +220,7 @@ impl Quantile<'_> {
             let next = if inside { next } else { 0.5 * (low + high) };
             let step = (next - y).abs();
             y = next;
+            // A last step of 1e-5 of the narrowest component leaves 1e-15 of it.
             let cubed = inside && (excess.abs() <= last || step <= 1e-5 * narrowest);
             if cubed || step <= 4.0 * f64::EPSILON * y.abs() {
                 break;

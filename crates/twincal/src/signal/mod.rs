@@ -31,7 +31,7 @@ pub use log::long::{Log, Logs, LongLog};
 pub use log::read_chapter::ReadChapter;
 pub use log::recording::{Channels, NextChannel, Payload, Recording};
 pub use log::shelf::{Numbers, Shelf};
-pub(crate) use log::stamps::median_step;
+pub(crate) use log::stamps::{is_plausible_step, median_step};
 
 #[cfg(test)]
 pub(crate) use clean::spline;

@@ -2,7 +2,7 @@
 
 use super::components::{Components, ROWS};
 use crate::lanes::{LANES, Lane, fuses};
-use crate::posterior::mixture::Level;
+use crate::posterior::mixture::{Level, accuracy};
 use crate::posterior::student::StudentT;
 
 /// What does not change from row to row.
@@ -302,16 +302,6 @@ fn quantile(constants: &Constants<'_>, scratch: &Scratch, level: Level) -> Lane 
         }
     }
     y
-}
-
-/// Error in probability with which a quantile is accepted, as a share of the tail; scales of components from `narrowest` to `widest`.
-#[inline(always)]
-fn accuracy(narrowest: f64, widest: f64) -> f64 {
-    if narrowest > 0.1 * widest {
-        1e-4
-    } else {
-        1e-13
-    }
 }
 
 /// Where the quantile of a mixture lies, lane by lane.

@@ -505,6 +505,12 @@ impl WriteBack {
         description.gravity = self.gravity.unwrap_or(description.gravity);
         description
     }
+
+    /// Whether the written file predicts torque worse than the user's on some joint: see [`JointTorqueError::worse`].
+    #[must_use]
+    pub fn is_worse(&self) -> bool {
+        self.torque_error.iter().any(|own| own.worse().is_some())
+    }
 }
 
 /// New gravity, where a column changes it.

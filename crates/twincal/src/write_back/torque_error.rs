@@ -5,6 +5,7 @@ use super::{Place, WriteBack, Writer};
 use crate::evaluator::STATES;
 use crate::linear_algebra::Cholesky;
 use crate::term::ModelColumn;
+use crate::validate::WORSE;
 use serde::Serialize;
 
 /// Share of the normal equations' diagonal that is added to it: columns depend on each other.
@@ -20,6 +21,15 @@ pub struct JointTorqueError {
     pub rms_before: Option<f64>,
     /// RMSE of the written file, likewise; `None` also where no candidate has the torque that the format cannot hold.
     pub rms: Option<f64>,
+}
+
+impl JointTorqueError {
+    /// Both errors, `[rms_before, rms]`, where the written file is worse than the user's by more than 2 %.
+    #[must_use]
+    pub fn worse(&self) -> Option<[f64; 2]> {
+        let (before, after) = self.rms_before.zip(self.rms)?;
+        (after > WORSE * before).then_some([before, after])
+    }
 }
 
 /// What the file holds, in coefficients.

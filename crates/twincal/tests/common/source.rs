@@ -1,5 +1,26 @@
 //! Rust source as tests of the source read it.
 
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// All files of Rust below a folder, by path.
+pub(crate) fn files_below(root: &Path) -> Vec<PathBuf> {
+    let mut folders = vec![root.to_path_buf()];
+    let mut files = Vec::new();
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(&folder).expect("a readable source tree") {
+            let path = entry.expect("a readable source tree").path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|extension| extension == "rs") {
+                files.push(path);
+            }
+        }
+    }
+    files.sort();
+    files
+}
+
 /// The text without comments, strings and character literals; their line breaks stay.
 pub(crate) fn blanked(text: &str) -> String {
     let mut code = String::with_capacity(text.len());

@@ -18,6 +18,7 @@ use twincal::assess;
 use twincal::calibrate::Calibration;
 use twincal::validate::Split;
 use twincal::words::significant;
+use twincal::write_back::{Holds, Writer};
 use twincal_io::words::{self, Answer};
 
 /// Lines of the whole output, and of that on a narrow terminal.
@@ -127,12 +128,14 @@ fn paths(all: impl Iterator<Item = impl AsRef<Path>>) -> Option<String> {
 pub(super) fn print(calibration: &Calibration, around: Around<'_>, terminal: &mut Terminal) {
     let answer = words::answer(calibration);
     terminal.answer(&answer.headline);
-    let page = page(calibration, &answer, around, terminal.width());
+    let steps = Steps::of(calibration, &answer, around);
+    let page = page(calibration, &steps, around, terminal.width());
     page.print(terminal);
 }
 
 /// The lines between the answer and the report's path.
-fn page(calibration: &Calibration, answer: &Answer, around: Around<'_>, columns: usize) -> Page {
+fn page(calibration: &Calibration, steps: &Steps<'_>, around: Around<'_>, columns: usize) -> Page {
+    let answer = steps.answer;
     let limit = match columns < NARROW {
         true => LINES_NARROW,
         false => LINES,
@@ -158,7 +161,7 @@ fn page(calibration: &Calibration, answer: &Answer, around: Around<'_>, columns:
         }
         page.blank();
         claims::list(calibration, answer, *detail, width, &mut page);
-        next(calibration, answer, around, *detail, width, &mut page);
+        next(calibration, steps, *detail, width, &mut page);
         page
     });
     let fits = |page: &Page| page.len() + taken <= limit;
@@ -205,10 +208,11 @@ fn scores(calibration: &Calibration, width: Width, page: &mut Page) {
         ),
     };
     let text = format!(
-        "{} → {} {} RMSE{change} on {held_out}",
+        "{} → {} {} RMSE{change} on {held_out}{}",
         significant(before, 3),
         significant(after, 3),
         words::pooled_unit(calibration),
+        words::before_calibration(calibration),
     );
     page.paragraph(&text, ["Torque error    ", OTHER_LINES], width, 3);
     if scores.coverage95.is_finite() {
@@ -222,11 +226,52 @@ fn scores(calibration: &Calibration, width: Width, page: &mut Page) {
     }
 }
 
+/// What the next steps rest on.
+struct Steps<'a> {
+    answer: &'a Answer,
+    /// Folder of the result as a command has it.
+    output: String,
+    /// What to run next.
+    command: String,
+}
+
+impl<'a> Steps<'a> {
+    fn of(calibration: &Calibration, answer: &'a Answer, around: Around<'_>) -> Self {
+        let output = quoted(&around.output.to_string_lossy());
+        let command = match answer.answer {
+            assess::Answer::Yes | assess::Answer::YesWithinLimits => {
+                export(calibration, around.format, &output)
+            }
+            assess::Answer::NotYet | assess::Answer::No => doubted(answer, around.typed, &output),
+        };
+        Self {
+            answer,
+            output,
+            command,
+        }
+    }
+}
+
+/// The export of a file of the user's own kind, or of code where `export` would refuse that file.
+fn export(calibration: &Calibration, format: &str, output: &str) -> String {
+    let (holds, file) = match format {
+        "mjcf" => (Holds::MJCF, "calibrated.xml"),
+        _ => (Holds::URDF, "calibrated.urdf"),
+    };
+    let change = Writer::new(calibration, holds).and_then(|writer| writer.mean());
+    match change.is_ok_and(|change| !change.is_worse()) {
+        true => format!("twincal export --twin {output} --to {format} -o {file}"),
+        false => format!(
+            "twincal export --twin {output} --to c -o twin.c writes the whole twin as code (also rust, python, json): export refuses the {} alone, which predicts worse than your model",
+            holds.format
+        ),
+    }
+}
+
 /// What to record, correct or run next.
 fn next(
     calibration: &Calibration,
-    answer: &Answer,
-    around: Around<'_>,
+    steps: &Steps<'_>,
     detail: Detail,
     width: Width,
     page: &mut Page,
@@ -240,26 +285,14 @@ fn next(
     {
         page.paragraph(super::summary::HOW_TO_FIX, begin, width, detail.step);
     }
-    if let Some(recording) = &answer.next {
+    if let Some(recording) = &steps.answer.next {
         let text = format!("Recording: {recording}");
         page.paragraph(&text, begin, width, detail.step);
     }
-    let output = quoted(&around.output.to_string_lossy());
-    if let Some(motion) = words::next_motion(calibration, &output) {
+    if let Some(motion) = words::next_motion(calibration, &steps.output) {
         page.paragraph(&motion.sentence(), begin, width, detail.step);
     }
-    let format = around.format;
-    let command = match answer.answer {
-        assess::Answer::Yes | assess::Answer::YesWithinLimits => {
-            let file = match format {
-                "mjcf" => "calibrated.xml",
-                _ => "calibrated.urdf",
-            };
-            format!("twincal export --twin {output} --to {format} -o {file}")
-        }
-        assess::Answer::NotYet | assess::Answer::No => doubted(answer, around.typed, &output),
-    };
-    page.paragraph(&command, begin, width, COMMAND_LINES);
+    page.paragraph(&steps.command, begin, width, COMMAND_LINES);
     page.blank();
 }
 

@@ -175,7 +175,12 @@ fn printed(calibration: &Calibration, columns: usize) -> Vec<String> {
         behind: 0,
         typed: None,
     };
-    let page = page(calibration, &answer(), around, columns);
+    let steps = Steps {
+        answer: &answer(),
+        output: "twincal-out".into(),
+        command: "twincal export --twin twincal-out --to urdf -o calibrated.urdf".into(),
+    };
+    let page = page(calibration, &steps, around, columns);
     page.texts().into_iter().map(str::to_owned).collect()
 }
 
@@ -261,4 +266,42 @@ fn without_a_held_out_row_no_error_is_printed() {
         text.starts_with("Torque error: not tested.") && !text.contains('–'),
         "{text}"
     );
+}
+
+/// The next step is a command that works: code of the twin where `export` would refuse the file.
+#[test]
+fn no_file_that_is_worse_than_the_model_is_proposed() {
+    let mut calibration = fitted();
+    let of = |calibration: &Calibration| export(calibration, "urdf", "out");
+    let file = "twincal export --twin out --to urdf -o calibrated.urdf";
+    assert_eq!(of(&calibration), file);
+    for component in &mut calibration.components {
+        component.status = Status::Established;
+    }
+    // Damping of 100 N·m·s/rad, which no joint of the logs has.
+    calibration.twin.posterior.mean.fill(100.0);
+    let said = of(&calibration);
+    assert!(
+        said.starts_with("twincal export --twin out --to c -o twin.c writes the whole twin"),
+        "{said}"
+    );
+    assert!(said.contains("export refuses the URDF alone"), "{said}");
+}
+
+/// Before calibration is without the friction that the file states: the line of the error says so where it states some.
+#[test]
+fn the_line_of_the_torque_error_says_what_before_is() {
+    let mut calibration = fitted();
+    let of = |calibration: &Calibration| {
+        let mut page = Page::default();
+        scores(calibration, Width(120), &mut page);
+        page.texts().join(" ")
+    };
+    let said = "before: your model without the friction";
+    assert!(!of(&calibration).contains(said));
+    let mut description = calibration.twin.robot.description().clone();
+    description.joints[0].unused_damping = 0.1;
+    let (robot, _) = Robot::new(description, &std::collections::BTreeMap::new()).expect("a robot");
+    calibration.twin.robot = robot;
+    assert!(of(&calibration).contains(said), "{}", of(&calibration));
 }

@@ -10,7 +10,7 @@ use crate::terminal::{Terminal, clean};
 use serde::Serialize;
 use twincal::assess::decisive;
 use twincal::calibrate::Calibration;
-use twincal::validate::{Scores, Split, WORSE};
+use twincal::validate::{Scores, Split};
 use twincal::words::listed;
 use twincal::write_back::{Holds, JointTorqueError, WriteBack};
 
@@ -99,19 +99,13 @@ fn worse_joints(errors: &[JointTorqueError], calibration: &Calibration) -> Optio
     let robot = &calibration.twin.robot;
     let worse: Vec<String> = (errors.iter().enumerate())
         .filter_map(|(number, own)| {
-            let (before, after) = worse(own)?;
+            let [before, after] = own.worse()?;
             let unit = robot.joint_kind(number).torque_unit();
             let (joint, before, after) = (clean(&own.joint), short(before), short(after));
             Some(format!("{joint} {before} -> {after} {unit}"))
         })
         .collect();
     (!worse.is_empty()).then(|| listed(worse, ", "))
-}
-
-/// Both errors where the written file is worse than the user's.
-fn worse(error: &JointTorqueError) -> Option<(f64, f64)> {
-    let both = error.rms_before.zip(error.rms);
-    both.filter(|(before, after)| *after > WORSE * *before)
 }
 
 /// Torque error of the file, before and after, beside that of the twin on rows that it was not fitted to.
@@ -159,8 +153,8 @@ pub(super) fn print(
 /// Joints on which the written file is worse than the user's: what it cannot hold kept the rest in balance.
 fn worse_alone(errors: &[JointTorqueError], format: &str) -> Option<String> {
     let worse: Vec<String> = (errors.iter())
-        .filter_map(|own| Some((&own.joint, worse(own)?)))
-        .map(|(joint, (before, after))| {
+        .filter_map(|own| Some((&own.joint, own.worse()?)))
+        .map(|(joint, [before, after])| {
             format!("{} ({} -> {})", clean(joint), short(before), short(after))
         })
         .collect();

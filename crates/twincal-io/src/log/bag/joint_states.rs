@@ -324,6 +324,7 @@ impl<'a> JointStates<'a> {
         mut findings: Vec<Finding>,
     ) -> Result<(Log<'static>, Vec<Finding>)> {
         self.refuse_what_is_damaged(&findings)?;
+        self.refuse_without_messages()?;
         self.check_topics()?;
         self.refuse_without_rows()?;
         let parts = self.choose()?;

@@ -41,15 +41,18 @@ impl<'a> Header<'a> {
                 return Err(Error::content(Place::line(file, 1), problem, remedy));
             }
             if let Some(first) = exact.insert(name.as_str(), index) {
-                return Err(Error::content(
-                    Place::line(file, 1),
-                    format!(
-                        "two columns are called `{name}` (number {} and {})",
-                        first + 1,
-                        index + 1
+                let numbers = format!("number {} and {}", first + 1, index + 1);
+                let (problem, remedy) = match is_unit(name) {
+                    true => (
+                        format!("the names of columns are units: `{name}` ({numbers})"),
+                        "write names in the place of the units, such as `t,q1,qd1,tau1`",
                     ),
-                    "give every column its own name",
-                ));
+                    false => (
+                        format!("two columns are called `{name}` ({numbers})"),
+                        "give every column its own name",
+                    ),
+                };
+                return Err(Error::content(Place::line(file, 1), problem, remedy));
             }
             folded.entry(name.to_lowercase()).or_default().push(index);
         }
@@ -90,4 +93,17 @@ impl<'a> Header<'a> {
         })?;
         Ok(self.channel(*index))
     }
+}
+
+/// Units of stamps, angles, lengths, torque and current, as recorders write them.
+const UNITS: [&str; 34] = [
+    "s", "sec", "ms", "us", "ns", "rad", "deg", "°", "m", "mm", "rad/s", "deg/s", "°/s", "m/s",
+    "mm/s", "rad/s^2", "rad/s2", "rad/s²", "deg/s^2", "m/s^2", "m/s2", "m/s²", "nm", "n*m", "n·m",
+    "n.m", "n m", "mnm", "n", "a", "ma", "v", "%", "-",
+];
+
+/// Whether a name is that of a unit, in brackets or without.
+fn is_unit(name: &str) -> bool {
+    let bare = name.trim_matches(['[', ']', '(', ')', ' ']).to_lowercase();
+    UNITS.contains(&bare.as_str())
 }

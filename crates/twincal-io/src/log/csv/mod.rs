@@ -37,16 +37,18 @@ impl<R: Read> Table<R> {
     pub(super) fn open(source: R, bytes: u64, name: &str) -> Result<Self> {
         let mut lines = Lines::new(source, name);
         let Some(header) = lines.header()? else {
-            let what = if lines.is_empty() {
-                "is empty (0 bytes)"
+            let (what, remedy) = if lines.is_empty() {
+                (
+                    "is empty (0 bytes)",
+                    "record, export or copy it again: nothing was written to it",
+                )
             } else {
-                "has no header, only blank or comment lines"
+                (
+                    "has no header, only blank or comment lines",
+                    "export a header line and at least one row",
+                )
             };
-            return Err(Error::content(
-                Place::file(name),
-                what,
-                "export a header line and at least one row",
-            ));
+            return Err(Error::content(Place::file(name), what, remedy));
         };
         let first = lines.data()?;
         let dialect = Dialect::detect(&header, first.as_ref());
@@ -252,14 +254,27 @@ impl<R: Read> Table<R> {
             .chars()
             .take(40)
             .collect();
-        Error::content(
-            place,
-            format!(
-                "`{shown}` in column `{}` is not a number",
-                self.header[column]
+        let column = &self.header[column];
+        let (problem, remedy) = match self.has_number(line) {
+            true => (
+                format!("`{shown}` in column `{column}` is not a number"),
+                "fix the cell (leave it empty if there is no value), or drop and count such rows with --lenient",
             ),
-            "fix the cell (leave it empty if there is no value), or drop and count such rows with --lenient",
-        )
+            false => (
+                format!("this line holds no number: `{shown}` in column `{column}`"),
+                "delete it if it holds units or names, or drop and count such rows with --lenient",
+            ),
+        };
+        Error::content(place, problem, remedy)
+    }
+
+    fn has_number(&self, line: &lines::Line) -> bool {
+        let mut found = false;
+        self.dialect.fields(&line.text, |field, _| {
+            let number = number::parse(field, self.dialect.decimal_comma);
+            found |= number.is_some_and(f64::is_finite);
+        });
+        found
     }
 }
 

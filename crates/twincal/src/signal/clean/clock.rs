@@ -3,7 +3,7 @@
 use super::repeats::{Cut, Sampled, sampled};
 use crate::error::{Code, Error, Finding, Result, Severity, WrongUnit};
 use crate::signal::log::recording::Recording;
-use crate::signal::log::stamps::{EVEN, GAP, median_positive};
+use crate::signal::log::stamps::{EVEN, GAP, is_plausible_step, median_positive};
 use rayon::prelude::*;
 
 /// Share of intervals' deviation (99 % of them) beyond which a jitter warning is given.
@@ -271,7 +271,7 @@ fn median_interval(
             "map the right time column, or give the sampling rate with --rate HZ",
         ));
     };
-    if (1e-5..0.5).contains(&interval) {
+    if is_plausible_step(interval) {
         return Ok(interval);
     }
     let step = ImplausibleStep::of(interval);

@@ -12,6 +12,11 @@ pub(crate) fn median_step(time: &[f64]) -> Option<f64> {
     median_positive(time.windows(2).map(|pair| pair[1] - pair[0]))
 }
 
+/// Whether logs of robots have such a usual step, s: otherwise the stamps are in another unit, and what lasts how long is not known.
+pub(crate) fn is_plausible_step(interval: f64) -> bool {
+    (1e-5..0.5).contains(&interval)
+}
+
 /// Median of the steps that are above 0; `None` without any.
 pub(crate) fn median_positive(steps: impl Iterator<Item = f64>) -> Option<f64> {
     let mut steps: Vec<f64> = steps.filter(|step| *step > 0.0).collect();

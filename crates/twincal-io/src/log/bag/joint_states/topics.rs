@@ -23,6 +23,21 @@ impl JointStates<'_> {
         }
     }
 
+    /// A file without any message, whatever topics it names.
+    pub(super) fn refuse_without_messages(&self) -> Result<()> {
+        if self.topics.iter().any(|topic| topic.messages > 0) {
+            return Ok(());
+        }
+        let list = match self.list(|_| true) {
+            list if list.is_empty() => "and no topics".to_owned(),
+            list => format!("on its topics: {list}"),
+        };
+        Err(self.refuse(
+            format!("holds no messages {list}"),
+            "record it again while the robot's joint states are published",
+        ))
+    }
+
     pub(super) fn check_topics(&self) -> Result<()> {
         if let Some(mapping) = &self.mapping {
             let names = self.topics.iter().map(|topic| topic.name.as_str());
@@ -37,9 +52,6 @@ impl JointStates<'_> {
         }
         if !self.topics.iter().any(|topic| topic.read_as.is_some()) {
             let list = self.list(|_| true);
-            if list.is_empty() {
-                return Err(self.refuse("has no topic at all", CONVERT));
-            }
             if self.mapping.is_some() {
                 return Ok(());
             }
