@@ -174,12 +174,33 @@ fn a_check_of_a_log_without_a_measurement_is_inconclusive() {
     assert!(done.out.starts_with("Not yet"), "{}", done.out);
 }
 
-/// Columns of torque that are turned, exchanged or late are no change of the robot; more friction is one.
+/// A folder with a twin of `run.csv`, and these logs.
+fn with_logs<const N: usize>(logs: [(&str, String); N]) -> tempfile::TempDir {
+    let folder = folder();
+    fs::write(folder.path().join("run.csv"), csv(2000, &|_, row| row)).expect("a file");
+    fit(folder.path(), &["-o", "out"]);
+    for (name, text) in logs {
+        fs::write(folder.path().join(name), text).expect("a file");
+    }
+    folder
+}
+
+/// The reason of the answer of `check` to a log, what it is about, and how many changes are seen.
+fn checked(folder: &Path, log: &str, exit_code: i32) -> (String, String, usize) {
+    let json = run(folder, ["check", log, "--twin", "out", "--json"]);
+    assert_eq!(json.code, Some(exit_code), "{log}: {}", json.out);
+    let said: Value = serde_json::from_str(&json.out).expect("JSON");
+    let text = |at: &str| said.pointer(at).and_then(Value::as_str).map(str::to_owned);
+    let changes = said["changes"].as_array().expect("changes").iter();
+    let changed = changes.filter(|change| change["changed"] == true).count();
+    let reason = text("/assessment/reason").expect("a reason");
+    let subject = text("/assessment/claims/0/subject/name").expect("a name");
+    (reason, subject, changed)
+}
+
+/// Columns of torque that are turned, exchanged or late are no change of the robot.
 #[test]
 fn a_check_of_a_misread_log_is_inconclusive() {
-    let folder = folder();
-    fs::write(folder.path().join("run.csv"), csv(2000, &|_, row| row)).unwrap();
-    fit(folder.path(), &["-o", "out"]);
     let turned = |columns: &'static [usize]| {
         csv(2000, &|_, mut row| {
             let turn = |cell: &String| (-cell.parse::<f64>().unwrap()).to_string();
@@ -196,78 +217,51 @@ fn a_check_of_a_misread_log_is_inconclusive() {
     let late = csv(2000, &|_, mut row| {
         let mut before = before.borrow_mut();
         before.push_back(row[7..].to_vec());
-        let own = if before.len() > 3 {
-            before.pop_front()
-        } else {
-            None
+        let own = match before.len() > 3 {
+            true => before.pop_front(),
+            false => None,
         };
         row.splice(7.., own.unwrap_or_else(|| before[0].clone()));
         row
     });
+    let folder = with_logs([
+        ("turned.csv", turned(&[7, 8])),
+        ("elbow.csv", turned(&[8])),
+        ("order.csv", exchanged),
+        ("late.csv", late),
+    ]);
+    for (log, code, subject) in [
+        ("turned.csv", "sign_flip", "turned.csv"),
+        ("elbow.csv", "sign_flip", "elbow"),
+        ("order.csv", "joint_order", "order.csv"),
+        ("late.csv", "log_torque_lag", "late.csv"),
+    ] {
+        assert_eq!(
+            verdict_is_the_answer(folder.path(), log),
+            "not_yet",
+            "{log}"
+        );
+        let found = checked(folder.path(), log, 3);
+        assert_eq!(found, (code.to_owned(), subject.to_owned(), 0), "{log}");
+    }
+}
+
+/// More viscous friction of the elbow is a change of the robot.
+#[test]
+fn a_check_of_a_robot_with_more_friction_fails() {
     let friction = csv(2000, &|_, mut row| {
         let number = |at: usize| row[at].parse::<f64>().unwrap();
         row[8] = (number(8) + 0.1 * number(4)).to_string();
         row
     });
-    let kind = |name: &str| serde_json::json!({"kind": "joint", "name": name});
-    let log = |name: &str| serde_json::json!({"kind": "log", "name": name});
-    for (name, text, answer, code, subject) in [
-        (
-            "turned.csv",
-            turned(&[7, 8]),
-            "not_yet",
-            "sign_flip",
-            log("turned.csv"),
-        ),
-        (
-            "elbow.csv",
-            turned(&[8]),
-            "not_yet",
-            "sign_flip",
-            kind("elbow"),
-        ),
-        (
-            "order.csv",
-            exchanged,
-            "not_yet",
-            "joint_order",
-            log("order.csv"),
-        ),
-        (
-            "late.csv",
-            late,
-            "not_yet",
-            "log_torque_lag",
-            log("late.csv"),
-        ),
-        (
-            "rough.csv",
-            friction,
-            "no",
-            "error_above_gate",
-            kind("elbow"),
-        ),
-    ] {
-        fs::write(folder.path().join(name), text).unwrap();
-        assert_eq!(verdict_is_the_answer(folder.path(), name), answer, "{name}");
-        let json = run(folder.path(), ["check", name, "--twin", "out", "--json"]);
-        let told: Value = serde_json::from_str(&json.out).unwrap();
-        assert_eq!(told["assessment"]["reason"], code, "{told}");
-        assert_eq!(
-            told["assessment"]["claims"][0]["subject"], subject,
-            "{told}"
-        );
-        assert_eq!(json.code, Some(if answer == "no" { 1 } else { 3 }));
-        let changes = told["changes"].as_array().unwrap().iter();
-        let changed = changes.filter(|change| change["changed"] == true).count();
-        assert_eq!(changed, usize::from(answer == "no"), "{name}");
-        let text = run(folder.path(), ["check", name, "--twin", "out"]);
-        assert!(
-            answer == "no" || !text.out.contains("changed:"),
-            "{}",
-            text.out
-        );
-    }
+    let folder = with_logs([("rough.csv", friction)]);
+    assert_eq!(verdict_is_the_answer(folder.path(), "rough.csv"), "no");
+    let (reason, subject, changed) = checked(folder.path(), "rough.csv", 1);
+    assert_eq!(
+        (reason.as_str(), subject.as_str()),
+        ("error_above_gate", "elbow")
+    );
+    assert_eq!(changed, 1);
 }
 
 #[test]

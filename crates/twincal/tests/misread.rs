@@ -104,7 +104,7 @@ fn torque_that_is_turned_exchanged_or_late_is_named() {
     let (code, _, all) = named(&twin, &|log| turned(exchanged(log), &[0]));
     assert_eq!(code, Code::JointOrder);
     let message = &all[0].message;
-    let both = "`shoulder` = the negative of torque of `elbow`, `elbow` = torque of `shoulder`";
+    let both = "`shoulder` = torque of `elbow`, `elbow` = the negative of torque of `shoulder`";
     assert!(message.contains(both), "{message}");
     for rows in [3, 6, -6, 20] {
         let (code, subject, all) = named(&twin, &|log| late(log, rows));

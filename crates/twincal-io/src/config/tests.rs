@@ -28,7 +28,7 @@ fn empty_config_gives_the_documented_defaults() {
     );
     assert_eq!(
         (settings.gates.rmse_ratio, settings.gates.coverage),
-        (1.2, [0.90, 1.0])
+        (1.2, None)
     );
     assert_eq!(settings.output, PathBuf::from("twincal-out"));
     assert_eq!(settings, Config::default().settings().unwrap());

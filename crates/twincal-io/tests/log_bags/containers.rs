@@ -253,7 +253,7 @@ fn an_empty_bag_is_refused() {
     states.topic("/joint_states", Some(JOINT_STATE), "cdr");
     contains(
         &refused(read_bytes(&states.finish())),
-        &["has no message of joint states"],
+        &["holds no messages on its topics: `/joint_states`"],
     );
 }
 

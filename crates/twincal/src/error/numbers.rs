@@ -109,7 +109,7 @@ numbers! {
     "joints" "count" "joints that move";
     "joints_at_most" "count" "joints up to which the family is proposed unasked";
     "lag" "s" "time from the motion to its torque";
-    "lag" [LogTorqueLag] "s" "that time, beyond the one of the other logs";
+    "lag" [LogTorqueLag] "s" "time from the motion of that log to its torque, by what the other logs say";
     "lag" [TimeSource] "s" "mean time by which the recorder's clock is later than the stamps";
     "lag_of_others" "s" "lag of the other joints";
     "lag_of_others" [LogTime] "s" "mean time by which the recorder's clock is later than the other topics' stamps";

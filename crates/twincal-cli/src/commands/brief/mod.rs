@@ -259,9 +259,9 @@ fn export(calibration: &Calibration, format: &str, output: &str) -> String {
         _ => (Holds::URDF, "calibrated.urdf"),
     };
     let change = Writer::new(calibration, holds).and_then(|writer| writer.mean());
-    match change.is_ok_and(|change| !change.is_worse()) {
-        true => format!("twincal export --twin {output} --to {format} -o {file}"),
-        false => format!(
+    match change.is_ok_and(|change| change.is_worse()) {
+        false => format!("twincal export --twin {output} --to {format} -o {file}"),
+        true => format!(
             "twincal export --twin {output} --to c -o twin.c writes the whole twin as code (also rust, python, json): export refuses the {} alone, which predicts worse than your model",
             holds.format
         ),
