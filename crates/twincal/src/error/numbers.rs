@@ -71,7 +71,7 @@ numbers! {
     "effort_limit" "N·m (N)" "effort limit of the model";
     "error_reduction" "share" "share by which the residual falls";
     "every" "count" "rows from one value of the slower channels to the next";
-    "explained" "share" "share of torque that model and friction explain with the change; of several joints the least";
+    "explained" "share" "share of torque that model and friction explain with the change; of exchanged joints the least";
     "explained_before" "share" "that share without the change";
     "factor" "factor" "measured torque over that of the model or of the others";
     "factor" [FactorInDoubt] "factor" "factor of the column in the fit";

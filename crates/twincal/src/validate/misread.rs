@@ -36,9 +36,13 @@ impl JointSums {
 
     /// Share of the variance of a column that the twin's torque of this joint explains; 0 where it is further off than a constant.
     fn explained(&self, reading: (usize, f64)) -> f64 {
-        let column = reading.0;
-        let variance = self.square[column] - self.sum[column].powi(2) / self.rows;
+        let variance = self.variance(reading.0);
         (1.0 - self.left(reading) / variance.max(f64::MIN_POSITIVE)).max(0.0)
+    }
+
+    /// Sum of squares of a column about its mean, N²·m².
+    fn variance(&self, column: usize) -> f64 {
+        self.square[column] - self.sum[column].powi(2) / self.rows
     }
 }
 
@@ -216,14 +220,18 @@ impl Readings {
     }
 
     fn all_turned(&self, log: &str) -> Finding {
-        let worst = |sign: f64| {
-            let shares = self.moving().map(|j| self.joints[j].explained((j, sign)));
-            shares.fold(1.0, f64::min)
+        let variance: f64 = self
+            .moving()
+            .map(|joint| self.weight[joint] * self.joints[joint].variance(joint))
+            .sum();
+        let share = |sign: f64| {
+            let left: f64 = self.moving().map(|j| self.left(j, (j, sign))).sum();
+            (1.0 - left / variance.max(f64::MIN_POSITIVE)).max(0.0)
         };
-        let [before, after] = [worst(1.0), worst(-1.0)];
+        let [before, after] = [share(1.0), share(-1.0)];
         let message = format!(
-            "log `{log}`: torque of all joints has the opposite sign: the twin explains at least {} of every joint's torque turned, {} as logged; \
-             turn the columns with [columns] factor",
+            "log `{log}`: torque of all joints has the opposite sign: the twin explains {} of it turned, {} as logged; turn the columns with \
+             [columns] factor",
             percent(after),
             percent(before)
         );
