@@ -1,4 +1,4 @@
-"""The how-to pages (docs/howto): their commands run in order in an empty folder, and print what the pages quote.
+"""The how-to pages (docs/howto) and the tutorial: their commands run in order in an empty folder, and print what the pages quote.
 
 What a page is, for these tests:
 - A link to a file of `examples/arm`, or to a script of a study, is a file that the reader copies into the folder. A ```toml
@@ -24,11 +24,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import ROOT, program
+from conftest import ROOT, SHARED, program
 
 EXAMPLES = ROOT / "examples" / "arm"
 STUDIES = ROOT / "studies"
 PAGES = sorted((ROOT / "docs" / "howto").glob("*.md"))
+TUTORIAL = ROOT / "docs" / "tutorial.md"
 TRUTH = json.loads((EXAMPLES / "truth.json").read_text())
 LINK = re.compile(r"\]\(([^)#]+)[^)]*\)")
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
@@ -146,9 +147,16 @@ def test_there_are_seven_pages_of_at_most_five_commands():
         assert not lost, (page.name, lost)
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+@pytest.mark.parametrize("page", [*PAGES, TUTORIAL], ids=lambda page: page.stem)
 def test_the_page_prints_what_it_quotes(page, folder_of):
-    pairs = followed(page, folder_of(page))
+    folder = folder_of(page)
+    if page == TUTORIAL:
+        recordings = SHARED / "double_pendulum"
+        if not recordings.exists():
+            pytest.skip("../shared/data is not there")
+        for file in [*recordings.glob("run*.csv"), recordings / "model_as_published.urdf", ROOT / "examples/double_pendulum/twincal.toml"]:
+            (folder / file.name).write_bytes(file.read_bytes())
+    pairs = followed(page, folder)
     assert pairs
     for quoted, printed in pairs:
         lost = missing(quoted, printed)

@@ -97,15 +97,18 @@ pub struct Gates {
 
 impl Gates {
     /// Smallest and largest coverage of a joint whose intervals hold the share `own` of the twin's held-out rows: as stated, or 0.90 to 1. Intervals
-    /// that were too narrow from the start, as the fit says, are no change: then 0.05 less than they held is enough.
+    /// that held less from the start, as the fit says, are no change: then 0.05 less than they held is enough.
     #[must_use]
     pub fn coverage_of(&self, own: f64) -> [f64; 2] {
-        self.coverage
-            .unwrap_or([LEAST_COVERAGE.min(own - SLACK), 1.0])
+        let least = match own < LEAST_COVERAGE {
+            true => own - SLACK,
+            false => LEAST_COVERAGE,
+        };
+        self.coverage.unwrap_or([least, 1.0])
     }
 }
 
-/// Share of rows that 95 % intervals hold at least, and how far that is below what they promise.
+/// Share of rows that 95 % intervals hold at least, and how far two logs of one robot may differ in it.
 const LEAST_COVERAGE: f64 = 0.90;
 const SLACK: f64 = 0.05;
 
