@@ -254,7 +254,13 @@ fn a_check_of_a_robot_with_more_friction_fails() {
         row[8] = (number(8) + 0.1 * number(4)).to_string();
         row
     });
-    let folder = with_logs([("rough.csv", friction)]);
+    let turned = csv(2000, &|_, mut row| {
+        for torque in &mut row[7..9] {
+            *torque = (-torque.parse::<f64>().unwrap()).to_string();
+        }
+        row
+    });
+    let folder = with_logs([("rough.csv", friction), ("turned.csv", turned)]);
     assert_eq!(verdict_is_the_answer(folder.path(), "rough.csv"), "no");
     let (reason, subject, changed) = checked(folder.path(), "rough.csv", 1);
     assert_eq!(
@@ -262,6 +268,30 @@ fn a_check_of_a_robot_with_more_friction_fails() {
         ("error_above_gate", "elbow")
     );
     assert_eq!(changed, 1);
+    // A log that is none of this robot's torque beside it excuses nothing, and counts in no score.
+    let line = [
+        "check",
+        "turned.csv",
+        "rough.csv",
+        "--twin",
+        "out",
+        "--json",
+    ];
+    let both: Value = serde_json::from_str(&run(folder.path(), line).expect(1).out).expect("JSON");
+    let alone = run(
+        folder.path(),
+        ["check", "rough.csv", "--twin", "out", "--json"],
+    )
+    .expect(1);
+    let alone: Value = serde_json::from_str(&alone.out).expect("JSON");
+    assert_eq!(both["gates"], alone["gates"]);
+    let text = run(folder.path(), &line[..5]).expect(1);
+    assert!(
+        text.out
+            .contains("Left out of all that follows: turned.csv"),
+        "{}",
+        text.out
+    );
 }
 
 #[test]

@@ -178,7 +178,23 @@ fn of_a_log_that_is_no_measurement_nothing_is_asked() {
 }
 
 #[test]
-fn gates_decide_but_not_on_torque_that_is_none() {
+fn a_finding_on_a_new_log_is_a_claim_on_that_log() {
+    let twin = twin();
+    let subjects = ["", "new.csv", "elbow"].map(|subject| {
+        let found = [Finding::new(Severity::Note, Code::SignFlip, subject, "", 0)];
+        of_gates(Vec::new(), &found, (&twin, &["new.csv"])).claims[0]
+            .subject
+            .clone()
+    });
+    let log = Subject::Log("new.csv".into());
+    assert_eq!(
+        subjects,
+        [Subject::Run, log, Subject::Joint("elbow".into())]
+    );
+}
+
+#[test]
+fn gates_decide_and_a_mistake_where_they_hold() {
     let above = || {
         let subject = Subject::Joint("elbow".into());
         Claim::of_gate(Code::ErrorAboveGate, subject, 2.0, [f64::NAN, 1.0])
@@ -195,19 +211,8 @@ fn gates_decide_but_not_on_torque_that_is_none() {
         let own = of_gates(gates, findings, (&twin, &["new.csv"]));
         (own.answer, own.reason)
     };
-    let subjects = ["", "new.csv", "elbow"].map(|subject| {
-        let found = [Finding::new(Severity::Note, Code::SignFlip, subject, "", 0)];
-        of_gates(Vec::new(), &found, (&twin, &["new.csv"])).claims[0]
-            .subject
-            .clone()
-    });
-    let log = Subject::Log("new.csv".into());
-    assert_eq!(
-        subjects,
-        [Subject::Run, log, Subject::Joint("elbow".into())]
-    );
     assert_eq!(of(Vec::new(), &flipped), (Answer::NotYet, Code::SignFlip));
-    // Torque that is not what it is said to be says nothing of the robot.
+    // Torque that is not what it is said to be decides where no other log has gates.
     for code in [
         Code::TorqueConstant,
         Code::TorqueCopied,
@@ -216,7 +221,9 @@ fn gates_decide_but_not_on_torque_that_is_none() {
         Code::LogTorqueLag,
     ] {
         let wrong = [Finding::new(Severity::Degraded, code, "elbow", "", 0)];
-        assert_eq!(of(vec![above()], &wrong), (Answer::NotYet, code));
+        assert_eq!(of(Vec::new(), &wrong), (Answer::NotYet, code));
+        let failed = (Answer::No, Code::ErrorAboveGate);
+        assert_eq!(of(vec![above()], &wrong), failed);
     }
     // A motion that is wrong for a while, or a log that is no news, does not excuse a gate that fails; without one it decides.
     for code in [Code::EncoderStuck, Code::LogWasFitted, Code::LogWasHeldout] {

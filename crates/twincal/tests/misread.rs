@@ -1,7 +1,10 @@
 //! Torque that is turned, exchanged or late is named as that, and a robot that changed is not. Truth is an arm in closed form.
 
-use crate::changes::{Robot, SAME, errors, fitted, log};
+use crate::changes::{FRICTION, Robot, SAME, TIP, VELOCITY, errors, fitted, log};
+use crate::two_link;
 use twincal::calibrate::Calibration;
+use twincal::random::Random;
+use twincal::robot::{Workspace, inverse_dynamics};
 use twincal::signal::Recording;
 use twincal::validate::{Changes, least_share};
 use twincal::{Code, Finding};
@@ -145,6 +148,69 @@ fn a_changed_robot_is_no_misread_log() {
             assert_eq!(found[0], [], "robot {k}, seed {seed}");
         }
     }
+}
+
+/// 20 s in which the elbow swings at 1 Hz while the shoulder rests, with `viscous` more friction of the elbow, N·m·s/rad: a lag in such a motion.
+fn swinging(seed: u64, viscous: f64) -> Recording {
+    let mut log = good(seed, SAME);
+    let real = two_link::arm(TIP).expect("an arm");
+    let (mut workspace, mut noise) = (Workspace::new(&real), Random::new(seed, 1));
+    let rate = std::f64::consts::TAU;
+    for (row, time) in log.time.iter().enumerate() {
+        let (sin, cos) = (rate * time).sin_cos();
+        let (q, qd, qdd) = (
+            [0.0, 0.3 * sin],
+            [0.0, 0.3 * rate * cos],
+            [0.0, -0.3 * rate * rate * sin],
+        );
+        let mut tau = [0.0; 2];
+        inverse_dynamics(&real, &mut workspace, &q, &qd, &qdd, &mut tau);
+        let hidden = 0.8 * (q[0] - q[1]).cos();
+        let friction = FRICTION[0] * qd[1] + FRICTION[1] * (qd[1] / VELOCITY).tanh();
+        tau[0] += 0.1 * noise.normal() - hidden;
+        tau[1] += 0.1 * noise.normal() + hidden + friction + viscous * qd[1];
+        for (joint, channels) in log.joints.iter_mut().enumerate() {
+            channels.q[row] = q[joint];
+            let all = [&mut channels.qd, &mut channels.qdd, &mut channels.tau];
+            for (values, own) in all.into_iter().zip([qd[joint], qdd[joint], tau[joint]]) {
+                values.as_mut().expect("values")[row] = own;
+            }
+        }
+    }
+    log
+}
+
+/// Friction explains such a log as well as a lag does: the change is named.
+#[test]
+fn more_friction_in_a_motion_of_one_frequency_is_no_late_log() {
+    let twin = fitted();
+    for viscous in [1.0, 2.0, 4.0] {
+        for seed in SEEDS {
+            let (found, changes) = read(&twin, &[swinging(seed, viscous)]);
+            assert_eq!(found[0], [], "{viscous}, seed {seed}");
+            assert_eq!(changes, 1, "{viscous}, seed {seed}");
+        }
+    }
+}
+
+/// A lag beyond the last one that is tried has no number.
+#[test]
+fn a_lag_at_the_end_of_the_search_is_at_least_that() {
+    let twin = fitted();
+    let (found, _) = read(&twin, &[late(swinging(300, 0.0), 40)]);
+    assert!(
+        found[0]
+            .iter()
+            .all(|own| own.message.contains("at least 2")),
+        "{found:?}"
+    );
+    let (found, _) = read(&twin, &[late(swinging(300, 0.0), 20)]);
+    assert!(
+        found[0]
+            .iter()
+            .all(|own| own.message.contains("200 ± 1 ms")),
+        "{found:?}"
+    );
 }
 
 /// How many findings each log has.

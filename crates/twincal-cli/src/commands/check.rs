@@ -92,7 +92,8 @@ pub(super) fn run(flags: &Check, terminal: &mut Terminal) -> Outcome<u8> {
     // A gate that the config does not give stays as the twin was fitted with.
     let gates = config.gates_over(stored.gates)?;
     let scored = score(&stored, &logs, gates.rmse_ratio, &mut found);
-    let (validation, changes) = scored.map_err(|error| logs.as_given(error))?;
+    let scored = scored.map_err(|error| logs.as_given(error))?;
+    let (validation, changes) = (scored.validation, scored.changes);
     drop(progress);
     require_strict(settings.log.strict, &found)?;
     let known = known_logs(&logs.files, &stored);
@@ -103,7 +104,12 @@ pub(super) fn run(flags: &Check, terminal: &mut Terminal) -> Outcome<u8> {
     gates.extend(changes::gates(&changes, least_share(own.gates.rmse_ratio)));
     found.splice(0..0, known.iter().cloned());
     let names: Vec<&str> = logs.logs.iter().map(|log| log.name()).collect();
-    let assessment = assessment(&gates, &found, (&stored.calibration, &names));
+    // What is no torque of this robot passes and fails no gate.
+    let judged = match scored.misread.len() == names.len() {
+        true => None,
+        false => Some(&gates[..]),
+    };
+    let assessment = assessment(judged, &found, (&stored.calibration, &names));
     let verdict = Verdict::of(assessment.answer);
     // What is said of the twin itself does not change what is said of these logs.
     found.extend(unusable(&stored.calibration));
@@ -122,10 +128,23 @@ pub(super) fn run(flags: &Check, terminal: &mut Terminal) -> Outcome<u8> {
     // One that is a warning is among the findings.
     let notes = known.iter().filter(|own| own.severity == Severity::Note);
     notes.for_each(|finding| paragraph(&finding.message, terminal));
+    if scored.misread.len() < names.len() {
+        left_out(&scored.misread, terminal);
+    }
     scores(gates, &validation, terminal);
     terminal.say("");
     findings(&found, Notes::In("the output of --json"), terminal);
     Ok(code)
+}
+
+/// Logs that are in no score.
+fn left_out(misread: &[String], terminal: &mut Terminal) {
+    if misread.is_empty() {
+        return;
+    }
+    let names = misread.iter().map(|name| clean(name));
+    let text = format!("Left out of all that follows: {}", listed(names, ", "));
+    paragraph(&text, terminal);
 }
 
 /// A warning that the twin's own answer is no or not yet.
@@ -204,8 +223,15 @@ impl Verdict {
     }
 }
 
-/// What the gates say of the twin. One fails on rows that are enough; otherwise too few of them say nothing.
-fn assessment(gates: &[Gate], found: &[Finding], known: (&Calibration, &[&str])) -> Assessment {
+/// What the gates say of the twin. One fails on rows that are enough; otherwise too few of them say nothing. `None` of logs that say nothing of it.
+fn assessment(
+    gates: Option<&[Gate]>,
+    found: &[Finding],
+    known: (&Calibration, &[&str]),
+) -> Assessment {
+    let Some(gates) = gates else {
+        return of_gates(Vec::new(), found, known);
+    };
     let mut claims: Vec<Claim> = gates.iter().filter_map(Gate::claim).collect();
     let fails = gates.iter().any(|gate| !gate.passed);
     // That no change is seen says nothing of how much could be.
@@ -371,25 +397,34 @@ fn beyond(validation: &Validation) -> Option<String> {
     ))
 }
 
-/// Scores of all logs together, and what they say of changes but for logs that are not what they are said to be; `ratio`: of a joint's error to the
-/// twin's, above which a gate fails.
+/// What logs say of a twin.
+struct Scored {
+    validation: Validation,
+    changes: Vec<Change>,
+    /// Logs whose torque is not what it is said to be. They are left out of scores and changes, unless all are such.
+    misread: Vec<String>,
+}
+
+/// Scores of all logs together, and what they say of changes. `ratio`: of a joint's error to the twin's, above which a gate fails.
 fn score(
     stored: &StoredTwin,
     logs: &LogInput,
     ratio: f64,
     findings: &mut Vec<Finding>,
-) -> Result<(Validation, Vec<Change>)> {
+) -> Result<Scored> {
     let twin = &stored.calibration.twin;
     let library = twin.library()?;
     let predictor = twin.predictor(&library)?;
-    let mut scores = HeldOut::new(twin.robot.joint_names());
+    let nothing = || HeldOut::new(twin.robot.joint_names());
+    let (mut scores, mut of_misread) = (nothing(), nothing());
     let own = stored.calibration.validation.moving.joints.iter();
     let errors: Vec<f64> = own.map(|joint| joint.rmse_calibrated).collect();
     let mut changes = Changes::new(twin, &library, &errors)?;
+    let mut misread = Vec::new();
     for log in &logs.logs {
         let each = (twin, &library, &predictor);
-        let (mut columns, mut own) = (None, changes.alone());
-        scores.score(each, log, findings, &mut |motion| {
+        let (mut columns, mut own, mut own_scores) = (None, changes.alone(), nothing());
+        own_scores.score(each, log, findings, &mut |motion| {
             if columns.is_none() {
                 columns = Some(no_measurement(twin, motion)?);
             }
@@ -401,11 +436,22 @@ fn score(
         }
         if said.is_empty() {
             changes.join(own);
+            scores += own_scores;
+        } else {
+            misread.push(log.name().to_owned());
+            of_misread += own_scores;
         }
         findings.extend(said);
     }
-    let changes = changes.finish(least_share(ratio));
-    Ok((scores.finish(Split::HeldoutLogs), changes))
+    let scores = match misread.len() == logs.logs.len() {
+        true => of_misread,
+        false => scores,
+    };
+    Ok(Scored {
+        validation: scores.finish(Split::HeldoutLogs),
+        changes: changes.finish(least_share(ratio)),
+        misread,
+    })
 }
 
 /// Torque columns of a log that hold another joint's torque, or one number: what they say of the robot is nothing.
@@ -440,7 +486,7 @@ mod tests {
                 gate("rmse", Code::ErrorAboveGate, enough),
                 gate("friction", Code::FrictionChanged, true),
             ];
-            let judged = assessment(&gates, &[], (&fitted(), &[]));
+            let judged = assessment(Some(&gates), &[], (&fitted(), &[]));
             (judged.answer, judged.reason)
         };
         assert_eq!(of(false), (Answer::NotYet, Code::TooShortToCheck));

@@ -550,7 +550,7 @@ pub struct CheckTable {
     /// Largest allowed RMSE of a joint relative to the RMSE stored in the twin; default 1.2.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub rmse_ratio: Option<f64>,
-    /// Smallest and largest allowed coverage of the 95 % interval of a joint; default: 0.90, or 0.05 below the twin's own where that is less than 0.90, to 1.0.
+    /// Smallest and largest allowed coverage of the 95 % interval of a joint; default: 0.90, or up to 0.05 below the twin's own where that is less than 0.90, to 1.0.
     pub coverage: Option<[f64; 2]>,
 }
 

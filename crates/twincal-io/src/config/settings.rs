@@ -97,13 +97,11 @@ pub struct Gates {
 
 impl Gates {
     /// Smallest and largest coverage of a joint whose intervals hold the share `own` of the twin's held-out rows: as stated, or 0.90 to 1. Intervals
-    /// that held less from the start, as the fit says, are no change: then 0.05 less than they held is enough.
+    /// that held less from the start, as the fit says, are no change: then the least is as much below `own` as that is below 0.90, at most 0.05.
     #[must_use]
     pub fn coverage_of(&self, own: f64) -> [f64; 2] {
-        let least = match own < LEAST_COVERAGE {
-            true => own - SLACK,
-            false => LEAST_COVERAGE,
-        };
+        let slack = (LEAST_COVERAGE - own).min(SLACK);
+        let least = (own - slack).clamp(0.0, LEAST_COVERAGE);
         self.coverage.unwrap_or([least, 1.0])
     }
 }

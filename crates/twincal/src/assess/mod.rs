@@ -49,7 +49,7 @@ pub use scores::{
 };
 
 use crate::calibrate::Calibration;
-use crate::error::{Code, Finding, Mistake};
+use crate::error::{Code, Finding};
 use serde::Serialize;
 
 /// What may be concluded from a calibration.
@@ -73,8 +73,8 @@ impl Assessment {
     }
 }
 
-/// What gates on new `logs` mean for a twin: they decide, and where they hold a mistake in those logs does. Torque that is not what it is said to be
-/// says nothing of the robot ([`Mistake::voids_gates`]): then that decides, whatever the gates say.
+/// What gates on new `logs` mean for a twin: they decide, and where they hold, or there are none, a mistake in those logs does. Torque that is not what
+/// it is said to be says nothing of the robot: give no gates of such logs.
 #[must_use]
 pub fn of_gates(
     gates: Vec<Claim>,
@@ -90,12 +90,8 @@ pub fn of_gates(
         }
     });
     let found: Vec<Claim> = found.collect();
-    let says_nothing = found.iter().any(|claim| {
-        let mistake = Mistake::of(claim.code, claim.severity);
-        mistake.is_some_and(Mistake::voids_gates)
-    });
     let mut claims = gates;
-    let decided = answer > Answer::YesWithinLimits && !says_nothing;
+    let decided = answer > Answer::YesWithinLimits;
     claims.extend(found);
     let (answer, reason) = match decided {
         true => (answer, reason),

@@ -375,7 +375,8 @@ impl Names<'_> {
         .with([("factor", factor), ("factor_sd", sd)])
     }
 
-    fn exchange(&self, log: usize, joints: [usize; 2], [before, after]: [f64; 2]) -> Finding {
+    fn exchange(&self, log: usize, joints: [usize; 2], shares: [f64; 2]) -> Finding {
+        let [before, after] = shares.map(|share| share.max(0.0));
         let (name, [a, b]) = (self.logs[log], joints.map(|joint| self.joints[joint]));
         Finding::new(
             Severity::Warning,
@@ -384,7 +385,7 @@ impl Names<'_> {
             format!(
                 "log `{name}`: joints `{a}` and `{b}` seem to have each other's torque: what the other logs say explains {:.0} % of it, {:.0} % \
                  exchanged; nothing was changed: rename the torque columns of this log, or leave it out",
-                100.0 * before.max(0.0),
+                100.0 * before,
                 100.0 * after
             ),
             2,

@@ -61,15 +61,6 @@ impl Mistake {
         TABLE.iter().map(|(code, severity, _)| (*code, *severity))
     }
 
-    /// Whether the torque of such a log is none that the model and its joints speak of: then no gate on it says anything of the robot.
-    #[must_use]
-    pub const fn voids_gates(self) -> bool {
-        matches!(
-            self,
-            Self::Contradiction | Self::NoMeasurement | Self::OddTorque
-        )
-    }
-
     /// The mistake that a finding of this severity speaks of; `None` where a "Yes" may stand beside it.
     #[must_use]
     pub fn of(code: Code, severity: Severity) -> Option<Self> {

@@ -72,6 +72,7 @@ numbers! {
     "error_reduction" "share" "share by which the residual falls";
     "every" "count" "rows from one value of the slower channels to the next";
     "explained" "share" "share of torque that model and friction explain with the change; of exchanged joints the least";
+    "explained" [LogTorqueExchanged] "share" "share of both joints' torque that the other logs explain, exchanged";
     "explained_before" "share" "that share without the change";
     "factor" "factor" "measured torque over that of the model or of the others";
     "factor" [FactorInDoubt] "factor" "factor of the column in the fit";
@@ -109,7 +110,7 @@ numbers! {
     "joints" "count" "joints that move";
     "joints_at_most" "count" "joints up to which the family is proposed unasked";
     "lag" "s" "time from the motion to its torque";
-    "lag" [LogTorqueLag] "s" "time from the motion of that log to its torque, by what the other logs say";
+    "lag" [LogTorqueLag] "s" "time from the motion of that log to its torque, by what the other logs, or the twin, say";
     "lag" [TimeSource] "s" "mean time by which the recorder's clock is later than the stamps";
     "lag_of_others" "s" "lag of the other joints";
     "lag_of_others" [LogTime] "s" "mean time by which the recorder's clock is later than the other topics' stamps";

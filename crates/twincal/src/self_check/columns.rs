@@ -85,8 +85,8 @@ fn copied(
     findings
 }
 
-/// Joints that move while their torque never changes. Of a joint that has a drive, as its torque changes in another log, it is no measurement unless
-/// it swings freely there: gravity and inertia cancel. Without such a log a torque of 0 is that of a joint without a drive where they nearly cancel.
+/// Joints that move while their torque never changes. A torque of 0 is that of a joint without a drive where gravity and inertia nearly cancel; where
+/// its torque changes in another log, of one that swings freely in this one: they cancel.
 fn constant(
     robot: &Robot,
     (log, sample, parts): (&str, &Sample, &Parts),
@@ -101,9 +101,9 @@ fn constant(
     let wrong = wrong.filter_map(|joint| {
         let value = sample.channels[3][joint][0];
         let size = match (has_drive[joint], value == 0.0) {
-            (true, _) => moved[joint],
+            (true, true) => moved[joint],
             (false, true) => clearly[joint],
-            (false, false) => driven[joint],
+            (_, false) => driven[joint],
         };
         Some((joint, value, size?))
     });
@@ -114,11 +114,12 @@ fn constant(
                 false => " while",
             };
             let message = format!(
-                "log `{log}`: the torque of joint `{}` is {} throughout{elsewhere} the model needs {} N·m (sd) for its motion: no measurement; map its \
+                "log `{log}`: the torque of joint `{}` is {} throughout{elsewhere} the model needs {} {} (sd) for its motion: no measurement; map its \
                  torque in [columns] tau, or leave this log out",
                 names[joint],
                 significant(value, 3),
-                significant(size, 2)
+                significant(size, 2),
+                robot.joint_kind(joint).torque_unit()
             );
             let count = sample.len as u64;
             Finding::new(Severity::Degraded, Code::TorqueConstant, names[joint], message, count)

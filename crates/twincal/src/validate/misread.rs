@@ -8,9 +8,10 @@ use crate::error::{Code, Finding, Severity};
 use crate::observations::Observations;
 use crate::words::listed;
 
-/// Share of S that a reading may leave. On simulated logs of a UR5 and a Panda the right reading of such a mistake leaves 0.02 at most, and of a robot
-/// with changed friction, payload or joint zero no reading leaves less than 0.67.
+/// Share of S that a reading may leave (docs/decisions/080-readings-before-changes.md).
 const LEFT: f64 = 0.25;
+/// The same of what the best change leaves: in a motion of one frequency more viscous friction is a lag.
+const LEFT_OF_CHANGE: f64 = 0.5;
 /// Latest and earliest torque that is tried, s.
 const LATEST: f64 = 0.25;
 /// Shifts that are tried to either side, at most; between two of them torque is a line.
@@ -63,6 +64,8 @@ struct LagSums {
 /// What reading torque later leaves.
 struct Late {
     lag: f64,
+    /// The lag may be larger: it is the last that is tried.
+    at_end: bool,
     sd: f64,
     /// Share of S.
     left: f64,
@@ -83,8 +86,8 @@ pub(super) struct Limits<'a> {
     pub(super) ratio: f64,
     /// What the best change explains of S over all joints.
     pub(super) change: f64,
-    /// Rows that count as one.
-    pub(super) memory: f64,
+    /// Longest autocorrelation time of the twin's noise, rows.
+    pub(super) autocorrelation_time: f64,
     pub(super) joints: &'a [&'a str],
 }
 
@@ -142,10 +145,12 @@ impl Readings {
         }
     }
 
-    /// What the log is, if no change of the robot explains its torque as well; empty where the torque is near the twin's, or nothing else is.
+    /// What the log is, if any change of the robot leaves twice as much of its torque; empty where the torque is near the twin's, or nothing else is.
     pub(super) fn findings(&self, log: &str, limits: &Limits<'_>) -> Vec<Finding> {
         let tried = [self.turned(limits), self.columns(limits), self.late(limits)];
-        let enough = |(_, gain): &(Reading, f64)| *gain >= limits.change;
+        let all: f64 = self.moving().map(|joint| self.logged(joint)).sum();
+        let of_change = (all - limits.change).max(0.0);
+        let enough = |(_, gain): &(Reading, f64)| all - gain < LEFT_OF_CHANGE * of_change;
         let best = tried.into_iter().flatten().filter(enough);
         match best.max_by(|a, b| a.1.total_cmp(&b.1)) {
             Some((Reading::Turned, _)) => vec![self.all_turned(log)],
@@ -212,7 +217,7 @@ impl Readings {
 
     /// All joints earlier or later.
     fn late(&self, limits: &Limits<'_>) -> Option<(Reading, f64)> {
-        let late = self.late.best(limits.memory)?;
+        let late = self.late.best(limits.autocorrelation_time)?;
         let logged: f64 = self.moving().map(|joint| self.logged(joint)).sum();
         let fails = self.moving().any(|joint| self.fails(joint, limits));
         let gain = (1.0 - late.left) * logged;
@@ -336,8 +341,8 @@ impl LagSums {
         }
     }
 
-    /// The lag that leaves least; `memory`: rows that count as one.
-    fn best(&self, memory: f64) -> Option<Late> {
+    /// The lag that leaves least.
+    fn best(&self, autocorrelation_time: f64) -> Option<Late> {
         if self.rows == 0.0 {
             return None;
         }
@@ -352,9 +357,12 @@ impl LagSums {
         };
         let all = (0..2 * side).map(between);
         let (k, a, slope, left) = all.min_by(|x, y| x.3.total_cmp(&y.3))?;
-        let variance = memory * left.max(0.0) / self.rows / slope.max(f64::MIN_POSITIVE);
+        let shift = k as f64 + a;
+        let variance =
+            autocorrelation_time * left.max(0.0) / self.rows / slope.max(f64::MIN_POSITIVE);
         Some(Late {
-            lag: self.step * (k as f64 + a - side as f64),
+            lag: self.step * (shift - side as f64),
+            at_end: shift <= 0.0 || shift >= 2.0 * side as f64,
             sd: self.step * variance.sqrt(),
             left: left / at(side).max(f64::MIN_POSITIVE),
         })
@@ -363,14 +371,17 @@ impl LagSums {
 
 impl Late {
     fn finding(&self, log: &str) -> Finding {
+        let size = 1e3 * self.lag.abs();
+        let size = match self.at_end {
+            true => format!("at least {size:.0} ms"),
+            false => format!("{size:.0} ± {:.0} ms", (1e3 * self.sd).max(1.0)),
+        };
+        let order = match self.lag > 0.0 {
+            true => "later behind",
+            false => "further ahead of",
+        };
         let message = format!(
-            "log `{log}`: torque is written {:.0} ± {:.0} ms {} the motion than in the logs of the fit: log it as those, or move its stamps by that much",
-            1e3 * self.lag.abs(),
-            (1e3 * self.sd).max(1.0),
-            match self.lag > 0.0 {
-                true => "later behind",
-                false => "further ahead of",
-            },
+            "log `{log}`: torque is written {size} {order} the motion than in the logs of the fit: log it as those, or move its stamps by that much"
         );
         Finding::new(Severity::Warning, Code::LogTorqueLag, log, message, 0)
             .with([("lag", self.lag), ("lag_sd", self.sd)])

@@ -258,13 +258,16 @@ fn export(calibration: &Calibration, format: &str, output: &str) -> String {
         "mjcf" => (Holds::MJCF, "calibrated.xml"),
         _ => (Holds::URDF, "calibrated.urdf"),
     };
-    let change = Writer::new(calibration, holds).and_then(|writer| writer.mean());
-    match change.is_ok_and(|change| change.is_worse()) {
-        false => format!("twincal export --twin {output} --to {format} -o {file}"),
-        true => format!(
-            "twincal export --twin {output} --to c -o twin.c writes the whole twin as code (also rust, python, json): export refuses the {} alone, which predicts worse than your model",
+    let code = format!(
+        "twincal export --twin {output} --to c -o twin.c writes the whole twin as code (also rust, python, json)"
+    );
+    match Writer::new(calibration, holds).and_then(|writer| writer.mean()) {
+        Ok(change) if change.is_worse() => format!(
+            "{code}: export refuses the {} alone, which predicts worse than your model",
             holds.format
         ),
+        Ok(_) => format!("twincal export --twin {output} --to {format} -o {file}"),
+        Err(_) => code,
     }
 }
 
