@@ -100,6 +100,13 @@ enum Reading {
     Late(Late),
 }
 
+/// A reading with S of the joints that it concerns, as logged and with it.
+struct Tried {
+    reading: Reading,
+    before: f64,
+    after: f64,
+}
+
 impl Readings {
     pub(super) fn new(error: &[f64]) -> Self {
         let sums = || JointSums {
@@ -148,15 +155,16 @@ impl Readings {
     /// What the log is, if any change of the robot leaves twice as much of its torque; empty where the torque is near the twin's, or nothing else is.
     pub(super) fn findings(&self, log: &str, limits: &Limits<'_>) -> Vec<Finding> {
         let tried = [self.turned(limits), self.columns(limits), self.late(limits)];
-        let all: f64 = self.moving().map(|joint| self.logged(joint)).sum();
-        let of_change = (all - limits.change).max(0.0);
-        let enough = |(_, gain): &(Reading, f64)| all - gain < LEFT_OF_CHANGE * of_change;
-        let best = tried.into_iter().flatten().filter(enough);
-        match best.max_by(|a, b| a.1.total_cmp(&b.1)) {
-            Some((Reading::Turned, _)) => vec![self.all_turned(log)],
-            Some((Reading::Columns(columns), _)) => self.of_columns(log, &columns, limits.joints),
-            Some((Reading::Late(late), _)) => vec![late.finding(log)],
+        let clear = |own: &Tried| own.after < LEFT_OF_CHANGE * (own.before - limits.change);
+        let best = tried.into_iter().flatten().filter(clear);
+        let gain = |own: &Tried| own.before - own.after;
+        match best.max_by(|a, b| gain(a).total_cmp(&gain(b))) {
             None => Vec::new(),
+            Some(own) => match own.reading {
+                Reading::Turned => vec![self.all_turned(log)],
+                Reading::Columns(columns) => self.of_columns(log, &columns, limits.joints),
+                Reading::Late(late) => vec![late.finding(log)],
+            },
         }
     }
 
@@ -179,17 +187,21 @@ impl Readings {
         self.logged(joint) > limits.ratio.powi(2) * self.joints[joint].rows
     }
 
-    /// All joints with the opposite sign, and by how much S is less.
-    fn turned(&self, limits: &Limits<'_>) -> Option<(Reading, f64)> {
+    /// All joints with the opposite sign.
+    fn turned(&self, limits: &Limits<'_>) -> Option<Tried> {
         let before: f64 = self.moving().map(|joint| self.logged(joint)).sum();
         let after: f64 = self.moving().map(|j| self.left(j, (j, -1.0))).sum();
         let fails = self.moving().any(|joint| self.fails(joint, limits));
         let several = self.moving().count() > 1;
-        (several && fails && after < LEFT * before).then_some((Reading::Turned, before - after))
+        (several && fails && after < LEFT * before).then_some(Tried {
+            reading: Reading::Turned,
+            before,
+            after,
+        })
     }
 
     /// Joints whose torque is that of another column, or of their own turned.
-    fn columns(&self, limits: &Limits<'_>) -> Option<(Reading, f64)> {
+    fn columns(&self, limits: &Limits<'_>) -> Option<Tried> {
         let failing: Vec<usize> = self.moving().filter(|j| self.fails(*j, limits)).collect();
         let best = |&joint: &usize| {
             let all = failing.iter().flat_map(|&from| [(from, 1.0), (from, -1.0)]);
@@ -210,18 +222,26 @@ impl Readings {
         if all_turned && read.len() > 1 && read.len() == self.moving().count() {
             return None;
         }
-        let gains = (read.iter()).map(|&(joint, own)| self.logged(joint) - self.left(joint, own));
-        let gain = gains.sum();
-        Some((Reading::Columns(read), gain))
+        let sum = |left: &dyn Fn(usize, (usize, f64)) -> f64| -> f64 {
+            read.iter().map(|&(joint, own)| left(joint, own)).sum()
+        };
+        Some(Tried {
+            before: sum(&|joint, _| self.logged(joint)),
+            after: sum(&|joint, own| self.left(joint, own)),
+            reading: Reading::Columns(read),
+        })
     }
 
     /// All joints earlier or later.
-    fn late(&self, limits: &Limits<'_>) -> Option<(Reading, f64)> {
+    fn late(&self, limits: &Limits<'_>) -> Option<Tried> {
         let late = self.late.best(limits.autocorrelation_time)?;
         let logged: f64 = self.moving().map(|joint| self.logged(joint)).sum();
         let fails = self.moving().any(|joint| self.fails(joint, limits));
-        let gain = (1.0 - late.left) * logged;
-        (fails && late.left < LEFT).then_some((Reading::Late(late), gain))
+        (fails && late.left < LEFT).then_some(Tried {
+            before: logged,
+            after: late.left * logged,
+            reading: Reading::Late(late),
+        })
     }
 
     fn all_turned(&self, log: &str) -> Finding {
