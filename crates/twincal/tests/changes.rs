@@ -11,8 +11,8 @@ use twincal::validate::{Change, ChangeKind, Changes, least_share};
 pub(crate) const TIP: f64 = 2.6;
 const MOVED: f64 = 3.0 + TIP;
 /// Viscous and Coulomb friction of the elbow.
-pub(crate) const FRICTION: [f64; 2] = [0.3, 0.4];
-pub(crate) const VELOCITY: f64 = 0.02;
+const FRICTION: [f64; 2] = [0.3, 0.4];
+const VELOCITY: f64 = 0.02;
 
 /// What changed: factor on the elbow's friction, kg more at the tip, and by how much the elbow's encoder reads too much, rad.
 #[derive(Clone, Copy)]

@@ -105,10 +105,8 @@ pub(super) fn run(flags: &Check, terminal: &mut Terminal) -> Outcome<u8> {
     found.splice(0..0, known.iter().cloned());
     let names: Vec<&str> = logs.logs.iter().map(|log| log.name()).collect();
     // What is no torque of this robot passes and fails no gate.
-    let judged = match scored.misread.len() == names.len() {
-        true => None,
-        false => Some(&gates[..]),
-    };
+    let says_something = scored.misread.len() < names.len();
+    let judged = says_something.then_some(&gates[..]);
     let assessment = assessment(judged, &found, (&stored.calibration, &names));
     let verdict = Verdict::of(assessment.answer);
     // What is said of the twin itself does not change what is said of these logs.
@@ -128,7 +126,7 @@ pub(super) fn run(flags: &Check, terminal: &mut Terminal) -> Outcome<u8> {
     // One that is a warning is among the findings.
     let notes = known.iter().filter(|own| own.severity == Severity::Note);
     notes.for_each(|finding| paragraph(&finding.message, terminal));
-    if scored.misread.len() < names.len() {
+    if says_something {
         left_out(&scored.misread, terminal);
     }
     scores(gates, &validation, terminal);

@@ -294,14 +294,14 @@ fn torque_columns_that_are_no_measurement_are_named() {
 #[test]
 fn a_torque_of_zero_is_no_measurement_where_another_log_shows_a_drive() {
     let mut description = arm(1.15).description().clone();
-    let light = description.links[4].inertia.as_mut().unwrap();
+    let light = (description.links[4].inertia.as_mut()).expect("an inertia of the last link");
     light.mass *= 1e-5;
     let elements = light.tensor.iter_mut().flatten();
     elements.for_each(|element| *element *= 1e-5);
-    let robot = Robot::new(description, &Default::default()).unwrap().0;
+    let (robot, _) = Robot::new(description, &Default::default()).expect("an arm");
     let mut logs = [0.0, 3.1].map(|seed| log_of(&robot, seed));
     let said = |logs: &[Trajectory]| -> Vec<String> {
-        let found = self_check(&robot, &pipeline(), logs).unwrap();
+        let found = self_check(&robot, &pipeline(), logs).expect("positions in radians");
         let constant = found.iter().filter(|own| own.code == Code::TorqueConstant);
         constant.map(|own| own.message.clone()).collect()
     };

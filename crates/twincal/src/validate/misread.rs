@@ -334,7 +334,7 @@ impl LagSums {
 
     /// Shifts to either side.
     fn side(&self) -> usize {
-        ((LATEST / self.step).round() as usize).clamp(1, SHIFTS)
+        ((LATEST / self.step) as usize).clamp(1, SHIFTS)
     }
 
     /// Adds consecutive rows of a joint.
