@@ -1,7 +1,12 @@
 //! Dense linear algebra: the one module that knows the linear-algebra crate (faer). Slices in, slices out, row-major.
 
 use faer::linalg::matmul::matmul;
+use faer::linalg::matmul::triangular::{BlockStructure, matmul as matmul_triangular};
+use faer::linalg::triangular_inverse::invert_lower_triangular;
 use faer::{Accum, MatMut, MatRef, Par, Side};
+
+/// Order from which on a triangle is inverted by blocks; smaller ones are done before the blocks are set up.
+const BLOCKED: usize = 64;
 
 /// aᵀb in eight running sums, which the compiler keeps in vectors.
 #[must_use]
@@ -41,6 +46,28 @@ fn multiplied(a: &[f64], right: MatRef<'_, f64>, rows: usize) -> Vec<f64> {
         matmul(to, Accum::Replace, left, right, 1.0, Par::Seq);
     }
     out
+}
+
+/// Adds `Rᵀ diag(weights) R` to the lower triangle of `sums` (size × size, row-major); R has `weights.len()` rows.
+pub(crate) fn add_weighted_squares(sums: &mut [f64], rows: &[f64], weights: &[f64], size: usize) {
+    if weights.is_empty() || size == 0 {
+        return;
+    }
+    let scaled: Vec<f64> = (rows.chunks_exact(size).zip(weights))
+        .flat_map(|(row, weight)| row.iter().map(move |x| weight * x))
+        .collect();
+    let count = weights.len();
+    matmul_triangular(
+        MatMut::from_row_major_slice_mut(sums, size, size),
+        BlockStructure::TriangularLower,
+        Accum::Add,
+        MatRef::from_row_major_slice(rows, count, size).transpose(),
+        BlockStructure::Rectangular,
+        MatRef::from_row_major_slice(&scaled, count, size),
+        BlockStructure::Rectangular,
+        1.0,
+        Par::Seq,
+    );
 }
 
 /// A symmetric matrix has no Cholesky factor: the first pivot that is not a positive number.
@@ -149,6 +176,14 @@ impl Cholesky {
     fn inverse_lower(&self) -> Vec<f64> {
         let n = self.size;
         let mut inverse = vec![0.0; n * n];
+        if n >= BLOCKED {
+            invert_lower_triangular(
+                MatMut::from_row_major_slice_mut(&mut inverse, n, n),
+                MatRef::from_row_major_slice(&self.lower, n, n),
+                Par::Seq,
+            );
+            return inverse;
+        }
         for i in 0..n {
             let (above, row) = inverse.split_at_mut(i * n);
             let row = &mut row[..=i];
@@ -171,14 +206,26 @@ impl Cholesky {
         let n = self.size;
         let lower = self.inverse_lower();
         let mut inverse = vec![0.0; n * n];
-        for row in lower
-            .chunks_exact(n.max(1))
-            .enumerate()
-            .map(|(k, row)| &row[..=k])
-        {
-            for (i, x) in row.iter().enumerate() {
-                let target = &mut inverse[i * n..i * n + i + 1];
-                target.iter_mut().zip(row).for_each(|(t, y)| *t += x * y);
+        if n >= BLOCKED {
+            let lower = MatRef::from_row_major_slice(&lower, n, n);
+            matmul_triangular(
+                MatMut::from_row_major_slice_mut(&mut inverse, n, n),
+                BlockStructure::TriangularLower,
+                Accum::Replace,
+                lower.transpose(),
+                BlockStructure::TriangularUpper,
+                lower,
+                BlockStructure::TriangularLower,
+                1.0,
+                Par::Seq,
+            );
+        } else {
+            let rows = lower.chunks_exact(n.max(1)).enumerate();
+            for row in rows.map(|(k, row)| &row[..=k]) {
+                for (i, x) in row.iter().enumerate() {
+                    let target = &mut inverse[i * n..i * n + i + 1];
+                    target.iter_mut().zip(row).for_each(|(t, y)| *t += x * y);
+                }
             }
         }
         for i in 0..n {
@@ -247,6 +294,40 @@ mod tests {
                 assert!((product - f64::from(i == j)).abs() < 1e-14);
             }
         }
+    }
+
+    /// Orders on both sides of [`BLOCKED`], a matrix whose entries fall with their distance: A A⁻¹ = 1, and the diagonal alone.
+    #[test]
+    fn inverses_are_inverses_however_large() {
+        for n in [1, 7, BLOCKED - 1, BLOCKED, 2 * BLOCKED + 13] {
+            let entry = |i: usize, j: usize| 0.8_f64.powi(i.abs_diff(j) as i32) + f64::from(i == j);
+            let matrix: Vec<f64> = (0..n * n).map(|k| entry(k / n, k % n)).collect();
+            let factor = Cholesky::new(&matrix, n).unwrap();
+            let (inverse, diagonal) = (factor.inverse(), factor.inverse_diagonal());
+            let unit = product(&matrix, &inverse, [n, n, n]);
+            for (k, value) in unit.iter().enumerate() {
+                assert!(
+                    (value - f64::from(k / n == k % n)).abs() < 1e-13,
+                    "{n}: {k}"
+                );
+                assert_eq!(inverse[k].to_bits(), inverse[k % n * n + k / n].to_bits());
+            }
+            for (i, value) in diagonal.iter().enumerate() {
+                assert!((value - inverse[i * n + i]).abs() < 1e-13, "{n}: {i}");
+            }
+        }
+    }
+
+    #[test]
+    fn weighted_squares_are_their_definition() {
+        let (rows, weights) = ([1.0, 2.0, 3.0, 4.0, 5.0, 6.0], [2.0, -1.0]);
+        let mut sums = [1.0; 9];
+        add_weighted_squares(&mut sums, &rows, &weights, 3);
+        // 1 + 2·(1,2,3)ᵀ(1,2,3) − (4,5,6)ᵀ(4,5,6), below and on the diagonal
+        assert_eq!(
+            sums,
+            [-13.0, 1.0, 1.0, -15.0, -16.0, 1.0, -17.0, -17.0, -17.0]
+        );
     }
 
     #[test]

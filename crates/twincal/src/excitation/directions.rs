@@ -110,7 +110,11 @@ impl Spectrum {
                     c[column] += y * from[column];
                 }
             }
-            sum += dot(&c, &apply(&self.power, &c));
+            for &i in columns {
+                let row = &self.power[i * self.size..(i + 1) * self.size];
+                let along: f64 = columns.iter().map(|&j| row[j] * c[j]).sum();
+                sum += c[i] * along;
+            }
         }
         sum
     }
@@ -297,9 +301,4 @@ fn subtract(vector: &mut [f64], known: &[Vec<f64>]) {
             }
         }
     }
-}
-
-fn apply(matrix: &[f64], vector: &[f64]) -> Vec<f64> {
-    let rows = matrix.chunks_exact(vector.len().max(1));
-    rows.map(|row| dot(row, vector)).collect()
 }

@@ -31,7 +31,8 @@ pub(super) fn approximate(problem: &Problem, warm: Option<&Posterior>) -> Result
     };
     let certain = certain::components(&standard, problem, warm);
     let reduced = Reduced::new(&standard, &certain);
-    let found = search::from_models(&reduced, problem, models_of(warm, &standard), budget, care);
+    let mut found =
+        search::from_models(&reduced, problem, models_of(warm, &standard), budget, care);
     let total = found.sums.total() / (1.0 - found.missing);
     let heaviest = shares(&reduced, &found, total, LISTED_MODELS);
     let all = total.ln() + found.sums.reference;
@@ -44,7 +45,7 @@ pub(super) fn approximate(problem: &Problem, warm: Option<&Posterior>) -> Result
         LISTED_MASS
     };
     let listed = Listed::new(&standard, heaviest, mass, LISTED_MODELS)?;
-    let mut averages = averages(&reduced, &found);
+    let mut averages = averages(&reduced, &mut found);
     let method = Method::Search {
         models: found.models.len() as u64,
         missing: found.missing,
@@ -67,7 +68,8 @@ pub(super) fn approximate(problem: &Problem, warm: Option<&Posterior>) -> Result
 }
 
 /// Averages over all models found.
-pub(super) fn averages(reduced: &Reduced<'_>, found: &Found) -> Averages {
+pub(super) fn averages(reduced: &Reduced<'_>, found: &mut Found) -> Averages {
+    let products = found.sums.products();
     let (sums, total, open) = (&found.sums, found.sums.total(), &reduced.open);
     let share = |values: &[f64]| -> Vec<f64> { values.iter().map(|x| x / total).collect() };
     let averages = Averages {
@@ -81,5 +83,5 @@ pub(super) fn averages(reduced: &Reduced<'_>, found: &Found) -> Averages {
         moment: share(&sums.moment),
         misfit: sums.misfit / total,
     };
-    reduced.widen(averages, &sums.products())
+    reduced.widen(averages, &products)
 }

@@ -21,7 +21,7 @@
 
 use super::bounds::{log_weight, most_of_sums};
 use super::certainty::{Certain, none};
-use super::moments::{Moments, present};
+use super::moments::{Covariance, Moments, present};
 use super::reduced::Reduced;
 use super::search::climb;
 use super::standard::{Block, Standard, nudged};
@@ -65,8 +65,7 @@ pub(super) fn components(
         variance: bounds.spread.clone(),
         excess: 0.0,
         holds: Vec::new(),
-        inside: Vec::new(),
-        covariance: Vec::new(),
+        joint: Covariance::Unknown,
     };
     let slabs: f64 = standard.precision.iter().map(|p| p.ln()).sum();
     let reference = prior.log_model(&prior.family_sizes()) + bounds.factors + 0.5 * slabs
@@ -118,8 +117,7 @@ fn weight_of(standard: &Standard, problem: &Problem, holds: &[bool]) -> Option<f
         variance: vec![0.0; standard.size()],
         excess: standard.misfit(model.scale) - 1.0,
         holds: Vec::new(),
-        inside: Vec::new(),
-        covariance: Vec::new(),
+        joint: Covariance::Unknown,
     };
     for ((&d, mean), spread) in positions.iter().zip(&model.mean).zip(&spread) {
         moments.delta[d] += mean * standard.natural(d);

@@ -5,7 +5,7 @@ use super::kin::Step;
 use super::pivot::Pivot;
 use super::standard::Standard;
 use super::walker::Walker;
-use crate::linear_algebra::{Cholesky, NotPositiveDefinite};
+use crate::linear_algebra::{Cholesky, NotPositiveDefinite, add_weighted_squares};
 use crate::prior::HalfSpace;
 use statrs::function::erf::erfc;
 
@@ -18,26 +18,27 @@ pub(super) struct Moments {
     pub(super) excess: f64,
     /// By place in `standard.blocks`.
     pub(super) holds: Vec<bool>,
-    /// Included positions, and their `(A_zz⁻¹)_kl`, row by row; both empty unless asked for.
-    pub(super) inside: Vec<usize>,
-    pub(super) covariance: Vec<f64>,
+    pub(super) joint: Covariance,
+}
+
+/// C = A_zz⁻¹ of one model.
+pub(super) enum Covariance {
+    /// Not asked for.
+    Unknown,
+    /// Of the included positions, row by row.
+    Whole {
+        inside: Vec<usize>,
+        entries: Vec<f64>,
+    },
+    /// `C + Σ f h hᵀ` of the present model's C: f of every h, and the entries of all, position by position of `at`.
+    Beside {
+        factors: Vec<f64>,
+        at: Vec<usize>,
+        halves: Vec<f64>,
+    },
 }
 
 impl Moments {
-    /// Covariances by place in `inside` and position, `entry(a, b, i, j)`; variances as they stand.
-    fn fill(&mut self, entry: impl Fn(usize, usize, usize, usize) -> f64) {
-        let count = self.inside.len();
-        self.covariance = vec![0.0; count * count];
-        for (a, &i) in self.inside.iter().enumerate() {
-            for (b, &j) in self.inside.iter().enumerate().take(a) {
-                let value = entry(a, b, i, j);
-                self.covariance[a * count + b] = value;
-                self.covariance[b * count + a] = value;
-            }
-            self.covariance[a * count + a] = self.variance[i];
-        }
-    }
-
     /// ln of the mass within the bounds if the coefficients were independent: guides the search, is no part of a result.
     pub(super) fn log_mass(&self, standard: &Standard) -> f64 {
         if !standard.bounded {
@@ -110,15 +111,18 @@ pub(super) fn present(walker: &Walker<'_>, joint: bool) -> Moments {
         delta[k] += tableau.gradient[k];
         variance[k] = tableau.diagonal[k];
     }
-    let (mut inside, mut covariance) = (Vec::new(), Vec::new());
-    if joint {
-        inside.clone_from(&tableau.members);
-        covariance.reserve(inside.len() * inside.len());
-        for &i in &inside {
-            let row = tableau.row(i);
-            covariance.extend(inside.iter().map(|&k| row[k]));
+    let joint = match joint {
+        false => Covariance::Unknown,
+        true => {
+            let inside = tableau.members.clone();
+            let mut entries = Vec::with_capacity(inside.len() * inside.len());
+            for &i in &inside {
+                let row = tableau.row(i);
+                entries.extend(inside.iter().map(|&k| row[k]));
+            }
+            Covariance::Whole { inside, entries }
         }
-    }
+    };
     Moments {
         delta,
         variance,
@@ -126,8 +130,7 @@ pub(super) fn present(walker: &Walker<'_>, joint: bool) -> Moments {
         holds: (0..standard.blocks.len())
             .map(|b| tableau.holds(b))
             .collect(),
-        inside,
-        covariance,
+        joint,
     }
 }
 
@@ -151,19 +154,15 @@ pub(super) fn after_flip(walker: &Walker<'_>, block: usize, excess: f64, joint: 
     let mut step = tableau.gradient[own.range()].to_vec();
     factor.solve(&mut step);
     let sign = if inside { -1.0 } else { 1.0 };
-    let stays: Vec<usize> = (tableau.members.iter().copied())
-        .filter(|i| !own.range().contains(i))
-        .collect();
-    let entering = if inside { 0..0 } else { own.range() };
-    // L⁻¹ of the block's part of every row that stays, then of the entering unit vectors.
-    let mut halves = vec![0.0; (stays.len() + entering.len()) * own.len];
-    let (rows, units) = halves.split_at_mut(stays.len() * own.len);
-    for (&i, cross) in stays.iter().zip(rows.chunks_exact_mut(own.len)) {
+    // L⁻¹ of the block's part of every included row, then of the entering unit vectors, which count the other way round.
+    let mut at = tableau.members.clone();
+    let mut halves = vec![0.0; at.len() * own.len];
+    for (&i, cross) in at.iter().zip(halves.chunks_exact_mut(own.len)) {
         cross.copy_from_slice(&tableau.row(i)[own.range()]);
         let shift: f64 = cross.iter().zip(&step).map(|(t, b)| t * b).sum();
-        moments.delta[i] -= shift;
         factor.solve_lower(cross);
         let spread: f64 = cross.iter().map(|x| x * x).sum();
+        moments.delta[i] -= shift;
         moments.variance[i] = (moments.variance[i] + sign * spread).max(1.0);
     }
     if inside {
@@ -172,27 +171,23 @@ pub(super) fn after_flip(walker: &Walker<'_>, block: usize, excess: f64, joint: 
             moments.variance[k] = 0.0;
         }
     } else {
-        for (a, unit) in units.chunks_exact_mut(own.len).enumerate() {
-            let k = own.start + a;
-            unit[a] = 1.0;
-            factor.solve_lower(unit);
-            moments.delta[k] = step[a] - standard.center[k];
+        at.extend(own.range());
+        let mut unit = vec![0.0; own.len];
+        for (k, entering) in own.range().zip(&step) {
+            unit.fill(0.0);
+            unit[k - own.start] = -1.0;
+            factor.solve_lower(&mut unit);
+            moments.delta[k] = entering - standard.center[k];
             moments.variance[k] = unit.iter().map(|x| x * x).sum();
+            halves.extend_from_slice(&unit);
         }
     }
     if joint {
-        let half = |a: usize| &halves[a * own.len..(a + 1) * own.len];
-        let change = |a: usize, b: usize| {
-            let pairs = half(a).iter().zip(half(b));
-            pairs.map(|(x, y)| x * y).sum::<f64>()
+        moments.joint = Covariance::Beside {
+            factors: vec![sign; own.len],
+            at,
+            halves,
         };
-        moments.inside = stays.iter().copied().chain(entering).collect();
-        let staying = stays.len();
-        moments.fill(|a, b, i, j| match (a < staying, b < staying) {
-            (true, true) => tableau.row(i)[j] + sign * change(a, b),
-            (false, false) => change(a, b),
-            _ => -change(a, b),
-        });
     }
     moments
 }
@@ -222,17 +217,12 @@ pub(super) fn after_exchange(
     moments.excess = excess;
     let (leaving, entering) = pivot.positions.split_at(pivot.leaving);
     let all = pivot.positions.len();
-    let stays: Vec<usize> = (tableau.members.iter().copied())
-        .filter(|i| !leaving.contains(i))
-        .collect();
-    // L⁻¹ v of every row that stays, then of the entering unit vectors.
-    let mut halves = vec![0.0; (stays.len() + entering.len()) * all];
-    let (rows, units) = halves.split_at_mut(stays.len() * all);
-    for (&i, v) in stays.iter().zip(rows.chunks_exact_mut(all)) {
+    // L⁻¹ v of every included row, then of the entering unit vectors, which count the other way round.
+    let mut at = tableau.members.clone();
+    let mut halves = vec![0.0; at.len() * all];
+    for (&i, v) in at.iter().zip(halves.chunks_exact_mut(all)) {
         let row = tableau.row(i);
-        v.iter_mut()
-            .zip(&pivot.positions)
-            .for_each(|(v, &k)| *v = row[k]);
+        (v.iter_mut().zip(&pivot.positions)).for_each(|(v, &k)| *v = row[k]);
         let (shift, spread) = pivot.forms(v);
         moments.delta[i] -= shift;
         moments.variance[i] = (moments.variance[i] - spread).max(1.0);
@@ -241,27 +231,25 @@ pub(super) fn after_exchange(
         moments.delta[k] = -standard.center[k];
         moments.variance[k] = 0.0;
     }
-    for ((a, &k), v) in entering.iter().enumerate().zip(units.chunks_exact_mut(all)) {
-        v[pivot.leaving + a] = 1.0;
-        let (mean, variance) = pivot.forms(v);
-        moments.delta[k] = mean - standard.center[k];
+    let mut unit = vec![0.0; all];
+    for (a, &k) in entering.iter().enumerate() {
+        unit.fill(0.0);
+        unit[pivot.leaving + a] = -1.0;
+        let (mean, variance) = pivot.forms(&mut unit);
+        moments.delta[k] = -mean - standard.center[k];
         moments.variance[k] = (-variance).max(1.0);
+        halves.extend_from_slice(&unit);
     }
+    at.extend(entering);
     for &block in step.leaving.iter().chain(&step.entering) {
         moments.holds[block] ^= true;
     }
     if joint {
-        let staying = stays.len();
-        let half = |a: usize| &halves[a * all..(a + 1) * all];
-        moments.inside = stays.iter().chain(entering).copied().collect();
-        moments.fill(|a, b, i, j| {
-            let form = pivot.form(half(a), half(b));
-            match (a < staying, b < staying) {
-                (true, true) => tableau.row(i)[j] - form,
-                (false, false) => -form,
-                _ => form,
-            }
-        });
+        moments.joint = Covariance::Beside {
+            factors: pivot.pivots.iter().map(|pivot| -1.0 / pivot).collect(),
+            at,
+            halves,
+        };
     }
     moments
 }
@@ -286,20 +274,37 @@ pub(super) struct Sums {
     joint: Option<Joint>,
 }
 
-/// Σ w E[γ γᵀ] of coefficients counted from those of the first model, γ = β − β₀: what is in neither model has γ = 0, so that a model costs the
-/// square of its own columns and not of all.
+/// Σ w E[γ γᵀ] of coefficients counted from those of the first model, γ = β − β₀.
+///
+/// Models beside one that is expanded wait until all are known: what they add is one product of matrices.
 #[derive(Debug, Clone)]
 struct Joint {
     /// γ − δ = β̂ − β₀; empty before the first model.
     offset: Vec<f64>,
-    /// Row-major.
+    /// Row-major; the lower triangle alone.
     products: Vec<f64>,
+    /// Rows of all positions whose weighted squares are still to be added, and the share of the expanded model's C.
+    waiting: Vec<f64>,
+    weights: Vec<f64>,
+    beside: f64,
 }
 
+/// Rows that wait at most: memory.
+const WAITING: usize = 256;
+
 impl Joint {
+    fn new(size: usize) -> Self {
+        Self {
+            offset: Vec::new(),
+            products: vec![0.0; size * size],
+            waiting: Vec::new(),
+            weights: Vec::new(),
+            beside: 0.0,
+        }
+    }
+
     /// One more model, by its share `weight` and that times φ.
     fn add(&mut self, center: &[f64], moments: &Moments, weight: f64, spread: f64) {
-        let size = moments.delta.len();
         if self.offset.is_empty() {
             let outside = |(center, variance): (&f64, &f64)| match *variance > 0.0 {
                 true => 0.0,
@@ -308,23 +313,76 @@ impl Joint {
             let columns = center.iter().zip(&moments.variance);
             self.offset = columns.map(outside).collect();
         }
-        let gamma: Vec<(usize, f64)> = (moments.delta.iter().zip(&self.offset).enumerate())
-            .map(|(k, (delta, offset))| (k, delta + offset))
-            .filter(|(_, gamma)| *gamma != 0.0)
-            .collect();
-        for &(i, own) in &gamma {
-            let (row, scaled) = (&mut self.products[i * size..(i + 1) * size], weight * own);
-            for &(j, other) in &gamma {
-                row[j] += scaled * other;
+        let gamma = moments.delta.iter().zip(&self.offset);
+        self.waiting
+            .extend(gamma.map(|(delta, offset)| delta + offset));
+        self.weights.push(weight);
+        match &moments.joint {
+            Covariance::Unknown => {}
+            Covariance::Whole { inside, entries } => self.add_whole(inside, entries, spread),
+            Covariance::Beside {
+                factors,
+                at,
+                halves,
+            } => {
+                self.beside += spread;
+                let size = center.len();
+                for (half, factor) in factors.iter().enumerate() {
+                    let start = self.waiting.len();
+                    self.waiting.resize(start + size, 0.0);
+                    let row = &mut self.waiting[start..];
+                    for (&k, values) in at.iter().zip(halves.chunks_exact(factors.len())) {
+                        row[k] = values[half];
+                    }
+                    self.weights.push(factor * spread);
+                }
             }
         }
-        let rows = moments.covariance.chunks_exact(moments.inside.len().max(1));
-        for (&i, covariances) in moments.inside.iter().zip(rows) {
+        if self.weights.len() >= WAITING {
+            self.settle();
+        }
+    }
+
+    /// Adds C of some positions.
+    fn add_whole(&mut self, inside: &[usize], entries: &[f64], spread: f64) {
+        let size = self.offset.len();
+        let rows = entries.chunks_exact(inside.len().max(1));
+        for (&i, covariances) in inside.iter().zip(rows) {
             let row = &mut self.products[i * size..(i + 1) * size];
-            for (&j, covariance) in moments.inside.iter().zip(covariances) {
+            for (&j, covariance) in inside.iter().zip(covariances) {
+                // what stands above the diagonal is never read
                 row[j] += spread * covariance;
             }
         }
+    }
+
+    /// Adds the rows that wait, without the positions that none of them has.
+    fn settle(&mut self) {
+        let size = self.offset.len();
+        let mut has = vec![false; size];
+        for row in self.waiting.chunks_exact(size.max(1)) {
+            (has.iter_mut().zip(row)).for_each(|(has, x)| *has |= *x != 0.0);
+        }
+        let used: Vec<usize> = (0..size).filter(|&k| has[k]).collect();
+        let mut rows = Vec::with_capacity(self.weights.len() * used.len());
+        for row in self.waiting.chunks_exact(size.max(1)) {
+            rows.extend(used.iter().map(|&k| row[k]));
+        }
+        let mut sums = vec![0.0; used.len() * used.len()];
+        add_weighted_squares(&mut sums, &rows, &self.weights, used.len());
+        let own = sums.chunks_exact(used.len().max(1)).enumerate();
+        for (a, row) in own {
+            let products = &mut self.products[used[a] * size..][..size];
+            (used[..=a].iter().zip(row)).for_each(|(&j, sum)| products[j] += sum);
+        }
+        self.waiting.clear();
+        self.weights.clear();
+    }
+
+    fn scale(&mut self, factor: f64) {
+        let rows = self.products.iter_mut().chain(&mut self.weights);
+        rows.for_each(|sum| *sum *= factor);
+        self.beside *= factor;
     }
 }
 
@@ -332,7 +390,6 @@ impl Sums {
     /// `joint`: with products.
     pub(super) fn new(standard: &Standard, joint: bool) -> Self {
         let factor = standard.noise_factor();
-        let products = vec![0.0; if joint { standard.size().pow(2) } else { 0 }];
         Self {
             reference: 0.0,
             factor: if factor.is_finite() { factor } else { 0.0 },
@@ -341,10 +398,7 @@ impl Sums {
             shift: vec![0.0; standard.size()],
             moment: vec![0.0; standard.size()],
             misfit: 0.0,
-            joint: joint.then(|| Joint {
-                offset: Vec::new(),
-                products,
-            }),
+            joint: joint.then(|| Joint::new(standard.size())),
         }
     }
 
@@ -368,9 +422,10 @@ impl Sums {
         self.total *= factor;
         self.misfit *= factor;
         let sums = [&mut self.inclusion, &mut self.shift, &mut self.moment];
-        let joint = self.joint.iter_mut().map(|joint| &mut joint.products);
-        let sums = sums.into_iter().chain(joint).flatten();
-        sums.for_each(|sum| *sum *= factor);
+        sums.into_iter().flatten().for_each(|sum| *sum *= factor);
+        if let Some(joint) = &mut self.joint {
+            joint.scale(factor);
+        }
     }
 
     /// E[δ δᵀ], row-major; empty unless columns were integrated out.
@@ -378,16 +433,25 @@ impl Sums {
     /// ```text
     /// E[δδᵀ] = E[γγᵀ] − E[γ]oᵀ − oE[γ]ᵀ + ooᵀ,     γ = δ + o
     /// ```
-    pub(super) fn products(&self) -> Vec<f64> {
-        let Some(Joint { offset, products }) = &self.joint else {
+    pub(super) fn products(&mut self) -> Vec<f64> {
+        let Some(joint) = &mut self.joint else {
             return Vec::new();
         };
+        joint.settle();
+        let Joint {
+            offset, products, ..
+        } = &*joint;
         let total = self.total;
         let gamma: Vec<f64> = (self.shift.iter().zip(offset))
             .map(|(shift, offset)| shift / total + offset)
             .collect();
         let size = gamma.len().max(1);
         let mut out: Vec<f64> = products.iter().map(|sum| sum / total).collect();
+        for i in 0..gamma.len() {
+            for j in 0..i {
+                out[j * size + i] = out[i * size + j];
+            }
+        }
         for (i, row) in out.chunks_exact_mut(size).enumerate() {
             if offset.is_empty() {
                 break;
@@ -398,6 +462,20 @@ impl Sums {
             }
         }
         out
+    }
+
+    /// The model whose neighbours were added is left: adds what all of them have of its C.
+    pub(super) fn leave(&mut self, walker: &Walker<'_>) {
+        let Some(joint) = (self.joint.as_mut()).filter(|joint| joint.beside != 0.0) else {
+            return;
+        };
+        let spread = std::mem::take(&mut joint.beside);
+        let size = joint.offset.len();
+        let inside = &walker.tableau.members;
+        for &i in inside {
+            let (row, sums) = (walker.tableau.row(i), &mut joint.products[i * size..]);
+            inside.iter().for_each(|&j| sums[j] += spread * row[j]);
+        }
     }
 
     /// One more model of `standard`.

@@ -21,7 +21,7 @@ pub(super) struct Pivot {
     /// Unit upper factor: row i right of the diagonal.
     factor: Vec<f64>,
     /// D.
-    pivots: Vec<f64>,
+    pub(super) pivots: Vec<f64>,
     /// `L⁻¹ g`.
     rhs: Vec<f64>,
     /// The weight is multiplied by `d^−½` beside prior and misfit, as in [`Tableau::block`].
@@ -114,7 +114,7 @@ impl Pivot {
         }
     }
 
-    /// `(v M⁻¹ g, v M⁻¹ vᵀ)`; `v` becomes `L⁻¹ v`.
+    /// `(v M⁻¹ g, v M⁻¹ vᵀ)`; `v` becomes `L⁻¹ v`, so that `v M⁻¹ wᵀ` of two such rows is their product by D⁻¹.
     pub(super) fn forms(&self, v: &mut [f64]) -> (f64, f64) {
         let all = self.pivots.len();
         let (mut with_gradient, mut with_itself) = (0.0, 0.0);
@@ -129,12 +129,6 @@ impl Pivot {
             }
         }
         (with_gradient, with_itself)
-    }
-
-    /// `v M⁻¹ wᵀ` of two rows that [`Pivot::forms`] has made `L⁻¹ v` and `L⁻¹ w`.
-    pub(super) fn form(&self, v: &[f64], w: &[f64]) -> f64 {
-        let pairs = v.iter().zip(w).zip(&self.pivots);
-        pairs.map(|((v, w), pivot)| v * w / pivot).sum()
     }
 }
 

@@ -268,10 +268,10 @@ impl Elimination {
     fn new(full: &Standard, gone: &[usize], left: &[usize]) -> Option<Self> {
         let (size, out) = (full.size(), gone.len());
         let at = |i: usize, j: usize| full.matrix[i * size + j];
-        let square: Vec<f64> = gone
-            .iter()
-            .flat_map(|&i| gone.iter().map(move |&j| at(i, j)))
-            .collect();
+        let mut square = Vec::with_capacity(out * out);
+        for &i in gone {
+            square.extend(gone.iter().map(|&j| at(i, j)));
+        }
         let factor = nudged(&square, out).ok()?;
         let mut cross: Vec<f64> = left
             .iter()

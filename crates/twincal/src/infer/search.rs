@@ -432,6 +432,7 @@ impl Search<'_> {
             if next.log_weight > self.best + EXCHANGED {
                 self.exchanged(&next.set);
             }
+            self.sums.leave(&self.walker);
             if self.sums.reference > reference {
                 // far heavier models than any before: everything so far in the new unit
                 let unit = (reference - self.sums.reference).exp();

@@ -11,7 +11,7 @@
 
 use super::check::check;
 use crate::error::{Error, Result};
-use crate::linear_algebra::{Cholesky, NotPositiveDefinite};
+use crate::linear_algebra::{Cholesky, NotPositiveDefinite, dot};
 use crate::posterior::{Model, Problem};
 use crate::prior::{HalfSpace, Prior};
 use statrs::function::erf::erfc;
@@ -249,10 +249,11 @@ impl Standard {
         let mut members = members.to_vec();
         members.sort_unstable_by_key(|&d| self.order[d]);
         let (size, count) = (self.size(), members.len());
-        let block: Vec<f64> = members
-            .iter()
-            .flat_map(|&i| members.iter().map(move |&j| self.matrix[i * size + j]))
-            .collect();
+        let mut block = Vec::with_capacity(count * count);
+        for &i in &members {
+            let row = &self.matrix[i * size..(i + 1) * size];
+            block.extend(members.iter().map(|&j| row[j]));
+        }
         let factor = nudged(&block, count).map_err(|error| self.singular(members[error.pivot]))?;
         // min over δ_z of 2hᵀδ + δᵀAδ with δ = −β̂ outside z: A_zz δ_z = A_ze β̂_e − h_z.
         let mut delta: Vec<f64> = self.center.iter().map(|x| -x).collect();
@@ -489,6 +490,6 @@ fn multiply(matrix: &[f64], x: &[f64]) -> Vec<f64> {
     }
     matrix
         .chunks_exact(x.len())
-        .map(|row| row.iter().zip(x).map(|(a, x)| a * x).sum())
+        .map(|row| dot(row, x))
         .collect()
 }

@@ -6,6 +6,8 @@ use super::{Family, Library};
 use crate::linear_algebra::dot;
 use crate::robot::Motion;
 
+/// Part of a column's square that a span which holds it cannot miss: far above the rounding of dot products.
+const PLAINLY_OUTSIDE: f64 = 1e-6;
 /// A column that leaves less than this part of its length outside a span lies in it.
 const TOLERANCE: f64 = 1e-9;
 /// Directions shorter than this part of a column are rounding.
@@ -146,6 +148,11 @@ fn basis<'a>(columns: impl Iterator<Item = &'a Vec<f64>>) -> Vec<Vec<f64>> {
 }
 
 fn within(column: &[f64], basis: &[Vec<f64>]) -> bool {
+    let square = dot(column, column);
+    let along = basis.iter().map(|direction| dot(direction, column).powi(2));
+    if along.sum::<f64>() < (1.0 - PLAINLY_OUTSIDE) * square {
+        return false;
+    }
     norm(&outside(column, basis)) < TOLERANCE * norm(column)
 }
 

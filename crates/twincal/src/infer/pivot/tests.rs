@@ -1,7 +1,7 @@
 //! Moments after an exchange against those of a tableau that walked there.
 
 use crate::infer::kin::Step;
-use crate::infer::moments::{Moments, after_exchange, after_flip, present};
+use crate::infer::moments::{Covariance, Moments, after_exchange, after_flip, present};
 use crate::infer::standard::Standard;
 use crate::infer::testing::grouped;
 use crate::infer::walker::Walker;
@@ -21,8 +21,12 @@ fn the_moments_are_those_of_the_model_after_the_walk() {
         let block = (state >> 33) as usize % blocks;
         let (_, excess) = walker.flip_gain(block);
         let got = after_flip(&walker, block, excess, true);
+        let size = standard.size();
+        let beside = dense(&present(&walker, true).joint, size, &[]);
+        let covariance = dense(&got.joint, size, &beside);
         walker.flip(pulp::Scalar::new(), block);
-        alike(&got, &present(&walker, true), &Step::default());
+        let truth = present(&walker, true);
+        alike(&got, &truth, &covariance, &Step::default());
         let (inside, outside): (Vec<usize>, Vec<usize>) =
             (0..blocks).partition(|&b| walker.tableau.holds(b));
         for &leaves in &inside {
@@ -55,10 +59,12 @@ fn compare(walker: &mut Walker<'_>, step: &Step) {
         "{step:?}: weight off by {}",
         before + gain - then
     );
-    alike(&got, &truth, step);
+    let beside = dense(&present(walker, true).joint, got.delta.len(), &[]);
+    let covariance = dense(&got.joint, got.delta.len(), &beside);
+    alike(&got, &truth, &covariance, step);
 }
 
-fn alike(got: &Moments, truth: &Moments, step: &Step) {
+fn alike(got: &Moments, truth: &Moments, covariance: &[f64], step: &Step) {
     assert_eq!(got.holds, truth.holds, "{step:?}");
     let close = |a: f64, b: f64| (a - b).abs() < 1e-7 * (1.0 + b.abs());
     assert!(close(got.excess, truth.excess), "{step:?}: c");
@@ -71,16 +77,41 @@ fn alike(got: &Moments, truth: &Moments, step: &Step) {
             truth.variance[k]
         );
     }
-    let covariance = |moments: &Moments, i: usize, j: usize| {
-        let place = |k: usize| moments.inside.iter().position(|&own| own == k);
-        let (a, b) = (place(i).unwrap(), place(j).unwrap());
-        moments.covariance[a * moments.inside.len() + b]
-    };
-    assert_eq!(got.inside.len(), truth.inside.len(), "{step:?}");
-    for &i in &truth.inside {
-        for &j in &truth.inside {
-            let (a, b) = (covariance(got, i, j), covariance(truth, i, j));
-            assert!(close(a, b), "{step:?}: covariance of {i} and {j}, {a} {b}");
+    let size = got.delta.len();
+    for (k, (a, b)) in covariance
+        .iter()
+        .zip(dense(&truth.joint, size, &[]))
+        .enumerate()
+    {
+        let (i, j) = (k / size, k % size);
+        assert!(close(*a, b), "{step:?}: covariance of {i} and {j}, {a} {b}");
+    }
+}
+
+/// C of all positions; `beside`: that of the present model.
+fn dense(joint: &Covariance, size: usize, beside: &[f64]) -> Vec<f64> {
+    let mut out = vec![0.0; size * size];
+    match joint {
+        Covariance::Unknown => panic!("covariances were asked for"),
+        Covariance::Whole { inside, entries } => {
+            for (k, entry) in entries.iter().enumerate() {
+                out[inside[k / inside.len()] * size + inside[k % inside.len()]] = *entry;
+            }
+        }
+        Covariance::Beside {
+            factors,
+            at,
+            halves,
+        } => {
+            out.copy_from_slice(beside);
+            let rows: Vec<&[f64]> = halves.chunks_exact(factors.len()).collect();
+            for (&i, x) in at.iter().zip(&rows) {
+                for (&j, y) in at.iter().zip(&rows) {
+                    let pairs = x.iter().zip(*y).zip(factors);
+                    out[i * size + j] += pairs.map(|((x, y), f)| f * x * y).sum::<f64>();
+                }
+            }
         }
     }
+    out
 }

@@ -34,7 +34,7 @@ fn summed(problem: &Problem, shrink: bool) -> (Averages, f64, bool) {
         let moments = present(&walker, reduced.shrinks());
         sums.add(&reduced.open, walker.log_weight(), &moments);
     }
-    let found = Found {
+    let mut found = Found {
         sums,
         models: Vec::new(),
         missing: 0.0,
@@ -42,7 +42,11 @@ fn summed(problem: &Problem, shrink: bool) -> (Averages, f64, bool) {
     };
     let log_sum = found.sums.total().ln() + found.sums.reference;
     let log_evidence = standard.log_evidence(log_sum);
-    (averages(&reduced, &found), log_evidence, reduced.shrinks())
+    (
+        averages(&reduced, &mut found),
+        log_evidence,
+        reduced.shrinks(),
+    )
 }
 
 /// Strong effects in components of several columns, columns mixed: the same posterior to rounding.
