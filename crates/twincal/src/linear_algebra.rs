@@ -4,6 +4,7 @@ use faer::linalg::matmul::matmul;
 use faer::linalg::matmul::triangular::{BlockStructure, matmul as matmul_triangular};
 use faer::linalg::triangular_inverse::invert_lower_triangular;
 use faer::{Accum, MatMut, MatRef, Par, Side};
+use std::ops::Range;
 
 /// Order from which on a triangle is inverted by blocks; smaller ones are done before the blocks are set up.
 const BLOCKED: usize = 64;
@@ -64,6 +65,32 @@ pub(crate) fn add_weighted_squares(sums: &mut [f64], rows: &[f64], weights: &[f6
         MatRef::from_row_major_slice(rows, count, size).transpose(),
         BlockStructure::Rectangular,
         MatRef::from_row_major_slice(&scaled, count, size),
+        BlockStructure::Rectangular,
+        1.0,
+        Par::Seq,
+    );
+}
+
+/// Adds `Z Zᵀ` to the lower triangle of `sums`, Z some columns of a matrix whose rows are `width` long.
+pub(crate) fn add_squares_of_columns(
+    sums: &mut [f64],
+    matrix: &[f64],
+    width: usize,
+    columns: Range<usize>,
+) {
+    let size = matrix.len() / width.max(1);
+    if columns.is_empty() || size == 0 {
+        return;
+    }
+    let some =
+        MatRef::from_row_major_slice(matrix, size, width).subcols(columns.start, columns.len());
+    matmul_triangular(
+        MatMut::from_row_major_slice_mut(sums, size, size),
+        BlockStructure::TriangularLower,
+        Accum::Add,
+        some,
+        BlockStructure::Rectangular,
+        some.transpose(),
         BlockStructure::Rectangular,
         1.0,
         Par::Seq,
@@ -328,6 +355,15 @@ mod tests {
             sums,
             [-13.0, 1.0, 1.0, -15.0, -16.0, 1.0, -17.0, -17.0, -17.0]
         );
+    }
+
+    #[test]
+    fn squares_of_columns_are_their_definition() {
+        let mut sums = [1.0; 4];
+        add_squares_of_columns(&mut sums, &[9.0, 1.0, 2.0, 9.0, 3.0, 4.0], 3, 1..3);
+        assert_eq!(sums, [6.0, 1.0, 12.0, 26.0]);
+        add_squares_of_columns(&mut sums, &[9.0, 1.0, 2.0, 9.0, 3.0, 4.0], 3, 2..2);
+        assert_eq!(sums, [6.0, 1.0, 12.0, 26.0]);
     }
 
     #[test]

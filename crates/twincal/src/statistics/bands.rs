@@ -9,7 +9,7 @@
 //! bands in which that noise has its power. Sums of runs, parts and logs add.
 
 use crate::gram::Symmetric;
-use crate::linear_algebra::dot;
+use crate::linear_algebra::add_squares_of_columns;
 use crate::observations::Part;
 use realfft::RealFftPlanner;
 use realfft::num_complex::Complex;
@@ -72,6 +72,7 @@ impl Bands {
             });
             bands.end(&mut run);
         }
+        bands.power.iter_mut().for_each(Symmetric::mirror);
         bands
     }
 
@@ -134,7 +135,7 @@ impl Run {
         }
     }
 
-    /// Adds the power of the run, which begins anew.
+    /// Adds the power of the run, which begins anew, to lower triangles.
     fn add_to(&mut self, power: &mut [Symmetric]) {
         let rows = self.len();
         if rows == 0 {
@@ -143,41 +144,28 @@ impl Run {
         let padded = (8 * rows).min(PADDED).max(2 * rows).next_power_of_two();
         let transform = self.planner.plan_fft_forward(padded);
         let mut scratch = transform.make_scratch_vec();
-        let bins = padded / 2 + 1;
-        // Real and imaginary parts by turns: a band is a stretch of them.
-        let transformed: Vec<Vec<f64>> = (self.values.iter_mut())
-            .map(|values| {
-                let mut input = std::mem::take(values);
-                input.resize(padded, 0.0);
-                let mut output = vec![Complex::new(0.0, 0.0); bins];
-                let done = transform.process_with_scratch(&mut input, &mut output, &mut scratch);
-                debug_assert!(done.is_ok(), "lengths are the plan's");
-                let scaled = output.iter().enumerate().flat_map(|(m, x)| {
-                    let twice = if m == 0 || m == bins - 1 { 1.0 } else { 2.0 };
-                    let root = f64::sqrt(twice / padded as f64);
-                    [x.re * root, x.im * root]
-                });
-                scaled.collect()
-            })
-            .collect();
+        let (mut input, bins) = (vec![0.0; padded], padded / 2 + 1);
+        let mut output = vec![Complex::new(0.0, 0.0); bins];
+        // A row per signal, real and imaginary parts by turns: a band is a stretch of columns.
+        let mut transformed = Vec::with_capacity(2 * bins * self.values.len());
+        let root = f64::sqrt(2.0 / padded as f64);
+        for values in &mut self.values {
+            input[..rows].copy_from_slice(values);
+            input[rows..].fill(0.0);
+            values.clear();
+            let done = transform.process_with_scratch(&mut input, &mut output, &mut scratch);
+            debug_assert!(done.is_ok(), "lengths are the plan's");
+            // The ends have no twin at a negative frequency.
+            for end in [0, bins - 1] {
+                output[end] *= std::f64::consts::FRAC_1_SQRT_2;
+            }
+            transformed.extend(output.iter().flat_map(|x| [x.re * root, x.im * root]));
+        }
         let bin = |edge: f64| (edge * padded as f64).ceil() as usize;
-        let edges = edges();
-        for (band, sums) in edges.windows(2).zip(power) {
-            let last = band[1] >= 0.5;
-            let stretch = 2 * bin(band[0])..2 * if last { bins } else { bin(band[1]) };
-            if stretch.is_empty() {
-                continue;
-            }
-            for i in 0..sums.size {
-                for j in 0..=i {
-                    let pair = [i, j].map(|signal| &transformed[signal][stretch.clone()]);
-                    let product = dot(pair[0], pair[1]);
-                    sums.values[i * sums.size + j] += product;
-                    if i != j {
-                        sums.values[j * sums.size + i] += product;
-                    }
-                }
-            }
+        for (band, sums) in edges().windows(2).zip(power) {
+            let last = if band[1] >= 0.5 { bins } else { bin(band[1]) };
+            let stretch = 2 * bin(band[0])..2 * last;
+            add_squares_of_columns(&mut sums.values, &transformed, 2 * bins, stretch);
         }
     }
 }
