@@ -11,7 +11,7 @@
 use super::excerpt::TRIPLE;
 use super::rows::{Block, FRICTION};
 use crate::linear_algebra::{Cholesky, dot};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 /// Share of its own size by which a parameter is held at the model's: directions that no motion shows stay there.
@@ -58,7 +58,7 @@ pub(super) struct Effect {
     pub(super) size: f64,
     /// Its standard deviation; infinite before [`CommonFit::judged`].
     pub(super) sd: f64,
-    /// Seconds with residuals of their own.
+    /// Seconds of the logs that have the column.
     pub(super) clusters: usize,
     /// By how much the sum of squares falls.
     pub(super) gain: f64,
@@ -276,6 +276,7 @@ impl CommonFit {
         self.matrix.solve(&mut solution);
         // r = R c̃, the residual without it, and their products by log and second.
         let (mut square, mut sums) = (0.0, BTreeMap::<(usize, i64), f64>::new());
+        let mut says = BTreeSet::new();
         for (number, own) in self.rows.iter().enumerate() {
             let column = number.checked_sub(range.start);
             let column = column.and_then(|at| columns.get(at)?.as_ref());
@@ -290,13 +291,16 @@ impl CommonFit {
             for (i, r) in r.iter().enumerate() {
                 let second = (own.block.time[i] / CLUSTER).floor() as i64;
                 let product = r * (own.residual[i] - effect.size * r);
+                if column.is_some() {
+                    says.insert((own.block.log, second));
+                }
                 *sums.entry((own.block.log, second)).or_default() += product;
             }
         }
         let squares: f64 = sums.values().map(|sum| sum * sum).sum();
         Some(Effect {
             sd: squares.sqrt() / square,
-            clusters: sums.len(),
+            clusters: says.len(),
             ..effect
         })
     }

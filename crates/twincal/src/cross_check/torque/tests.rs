@@ -206,6 +206,18 @@ fn torque_whose_clock_drifts_is_found_in_all_logs_and_in_one() {
     }
 }
 
+/// What one of three logs of 20 s says has 20 seconds behind it, and not the 60 of all: an sd from fewer says nothing.
+#[test]
+fn a_log_is_judged_by_its_own_seconds() {
+    let logs = logs(0, 3);
+    let fit = common_fit(&arm(1.0), &compared(&logs)).unwrap();
+    let of = |log: usize| move |own: Fitted<'_>| (own.block().log == log).then(|| growing(own));
+    let one = fit.judged(Some(1), of(1)).unwrap();
+    let all = fit.judged(None, |own| Some(growing(own))).unwrap();
+    assert!((18..=21).contains(&one.clusters), "{}", one.clusters);
+    assert!((54..=63).contains(&all.clusters), "{}", all.clusters);
+}
+
 #[test]
 fn torque_that_is_late_in_one_log_is_named() {
     for rows in [4, 8] {
