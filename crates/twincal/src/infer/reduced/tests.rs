@@ -1,7 +1,7 @@
 //! Posteriors with columns integrated out against those with every column in the tableau, and against densities.
 
 use super::*;
-use crate::infer::approximate::averages;
+use crate::infer::approximate::{approximate, averages};
 use crate::infer::certain::components;
 use crate::infer::moments::{Sums, present};
 use crate::infer::search::Found;
@@ -93,6 +93,32 @@ fn integrating_columns_out_changes_nothing() {
             let sd = (got.moment[d] - got.shift[d] * got.shift[d]).sqrt() / unit;
             let off = (sd / truth.sd[k] - 1.0).abs();
             assert!(off < 1e-6, "{sizes:?}: sd {k} off by {off}");
+        }
+    }
+}
+
+/// The search adds the moments of neighbours together, by flips and exchanges: sd of all columns are those of all models, also of the ones that are gone.
+#[test]
+fn the_search_knows_the_sd_of_what_is_gone() {
+    let cases: [(u64, &[usize]); 3] = [
+        (3, &[10, 6, 4, 4, 1, 6, 1, 4]),
+        (5, &[4, 4, 1, 2, 2, 1, 1, 1, 6]),
+        (6, &[1; 10]),
+    ];
+    for (seed, sizes) in cases {
+        let data = acting(seed, sizes, 150, true, 4.0);
+        let standard = Standard::new(&data.problem).unwrap();
+        let certain = components(&standard, &data.problem, None);
+        let reduced = Reduced::new(&standard, &certain);
+        assert!(reduced.shrinks() && !reduced.active.is_empty(), "{sizes:?}");
+        let (got, truth) = (
+            approximate(&data.problem, None).unwrap(),
+            Densities::new(&data),
+        );
+        for k in 0..data.problem.xy.len() {
+            let off = (got.sd[k] / truth.sd[k] - 1.0).abs();
+            let pip = truth.pip[data.problem.prior.component[k]];
+            assert!(pip < 0.01 || off < 1e-5, "{sizes:?}: sd {k} off by {off}");
         }
     }
 }
