@@ -49,6 +49,15 @@ fn multiplied(a: &[f64], right: MatRef<'_, f64>, rows: usize) -> Vec<f64> {
     out
 }
 
+/// The upper triangle of a row-major matrix as the lower one: symmetric to the last bit.
+pub(crate) fn mirror(matrix: &mut [f64], size: usize) {
+    for i in 0..size {
+        for j in 0..i {
+            matrix[j * size + i] = matrix[i * size + j];
+        }
+    }
+}
+
 /// Adds `Rᵀ diag(weights) R` to the lower triangle of `sums` (size × size, row-major); R has `weights.len()` rows.
 pub(crate) fn add_weighted_squares(sums: &mut [f64], rows: &[f64], weights: &[f64], size: usize) {
     if weights.is_empty() || size == 0 {
@@ -255,11 +264,7 @@ impl Cholesky {
                 }
             }
         }
-        for i in 0..n {
-            for j in 0..i {
-                inverse[j * n + i] = inverse[i * n + j];
-            }
-        }
+        mirror(&mut inverse, n);
         inverse
     }
 
@@ -329,7 +334,7 @@ mod tests {
         for n in [1, 7, BLOCKED - 1, BLOCKED, 2 * BLOCKED + 13] {
             let entry = |i: usize, j: usize| 0.8_f64.powi(i.abs_diff(j) as i32) + f64::from(i == j);
             let matrix: Vec<f64> = (0..n * n).map(|k| entry(k / n, k % n)).collect();
-            let factor = Cholesky::new(&matrix, n).unwrap();
+            let factor = Cholesky::new(&matrix, n).expect("0.8^|i − j| is positive definite");
             let (inverse, diagonal) = (factor.inverse(), factor.inverse_diagonal());
             let unit = product(&matrix, &inverse, [n, n, n]);
             for (k, value) in unit.iter().enumerate() {

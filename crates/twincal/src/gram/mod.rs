@@ -47,15 +47,6 @@ impl Symmetric {
 }
 
 impl Symmetric {
-    /// Copies what stands below the diagonal to above it.
-    pub(crate) fn mirror(&mut self) {
-        for i in 0..self.size {
-            for j in 0..i {
-                self.values[j * self.size + i] = self.values[i * self.size + j];
-            }
-        }
-    }
-
     /// The part of some rows and the same columns.
     pub(crate) fn of(&self, rows: &[usize]) -> Self {
         let entries = rows

@@ -5,7 +5,7 @@ use super::kin::Step;
 use super::pivot::Pivot;
 use super::standard::Standard;
 use super::walker::Walker;
-use crate::linear_algebra::{Cholesky, NotPositiveDefinite, add_weighted_squares};
+use crate::linear_algebra::{Cholesky, NotPositiveDefinite, add_weighted_squares, mirror};
 use crate::prior::HalfSpace;
 use statrs::function::erf::erfc;
 
@@ -18,6 +18,7 @@ pub(super) struct Moments {
     pub(super) excess: f64,
     /// By place in `standard.blocks`.
     pub(super) holds: Vec<bool>,
+    /// `(A_zz⁻¹)_kl`.
     pub(super) joint: Covariance,
 }
 
@@ -447,11 +448,7 @@ impl Sums {
             .collect();
         let size = gamma.len().max(1);
         let mut out: Vec<f64> = products.iter().map(|sum| sum / total).collect();
-        for i in 0..gamma.len() {
-            for j in 0..i {
-                out[j * size + i] = out[i * size + j];
-            }
-        }
+        mirror(&mut out, gamma.len());
         for (i, row) in out.chunks_exact_mut(size).enumerate() {
             if offset.is_empty() {
                 break;

@@ -5,6 +5,8 @@
 //! ```
 //! Whatever is linear or quadratic in columns costs less with parts, and is the same but for rounding.
 
+use crate::linear_algebra::mirror;
+
 /// The weights W of one joint, row by row without their zeros.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Recipes {
@@ -184,15 +186,6 @@ impl Recipes {
 fn add(sum: &mut [f64], factor: f64, x: &[f64]) {
     for (sum, x) in sum.iter_mut().zip(x) {
         *sum += factor * x;
-    }
-}
-
-/// The upper triangle as the lower one: symmetric to the last bit.
-fn mirror(matrix: &mut [f64], size: usize) {
-    for i in 0..size {
-        for j in 0..i {
-            matrix[j * size + i] = matrix[i * size + j];
-        }
     }
 }
 
