@@ -29,7 +29,6 @@ use super::walker::Walker;
 use crate::linear_algebra::Cholesky;
 use crate::posterior::{Posterior, Problem};
 use crate::prior::{HalfSpace, Prior, SETTLED};
-use pulp::{Simd, WithSimd};
 
 /// ln of the share of the mass below which models are not visited: 4e-18, far below one ulp of the sum.
 const NEGLIGIBLE: f64 = -40.0;
@@ -72,11 +71,7 @@ pub(super) fn components(
         - 0.5 * factor.log_determinant();
     let first = bounds.judge(reference + full.log_mass(standard));
     let reduced = Reduced::new(standard, &first);
-    let climbed = pulp::Arch::new().dispatch(Climb {
-        standard: &reduced.open,
-        prior,
-    });
-    bounds.judge(climbed)
+    bounds.judge(climbed(&reduced.open, prior))
 }
 
 /// ln of the weight that the heaviest model of another posterior has here, its bounds counted as the search's guide does;
@@ -221,26 +216,13 @@ impl<'a> Bounds<'a> {
 }
 
 /// ln of the weight of a good model, its bounds counted as the search's guide does: the full one and a climb.
-struct Climb<'a> {
-    standard: &'a Standard,
-    prior: &'a Prior,
-}
-
-impl WithSimd for Climb<'_> {
-    type Output = f64;
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) -> f64 {
-        let mut walker = Walker::new(self.standard, self.prior);
-        let all: Vec<usize> = (0..self.standard.blocks.len()).collect();
-        // No closure: it would not be compiled for the instructions of its place.
-        for &block in &all {
-            walker.flip(simd, block);
-        }
-        walker.tableau.refine();
-        climb(simd, &mut walker, &all, &[]);
-        walker.log_weight() + present(&walker, false).log_mass(self.standard)
-    }
+fn climbed(standard: &Standard, prior: &Prior) -> f64 {
+    let mut walker = Walker::new(standard, prior);
+    let all: Vec<usize> = (0..standard.blocks.len()).collect();
+    all.iter().for_each(|&block| walker.flip(block));
+    walker.tableau.refine();
+    climb(&mut walker, &all, &[]);
+    walker.log_weight() + present(&walker, false).log_mass(standard)
 }
 
 #[cfg(test)]

@@ -96,7 +96,7 @@ mod tests {
             let (inside, outside): (Vec<usize>, Vec<usize>) =
                 (0..count).partition(|&b| set >> b & 1 == 1);
             let flips = inside.iter();
-            flips.for_each(|&b| walker.flip(pulp::Scalar::new(), b));
+            flips.for_each(|&b| walker.flip(b));
             let tableau = &walker.tableau;
             for block in 0..count {
                 let then = admissible(set ^ 1 << block);

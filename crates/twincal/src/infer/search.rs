@@ -14,7 +14,6 @@ use super::standard::Standard;
 use super::walker::Walker;
 use crate::posterior::{Model, Posterior, Problem};
 use crate::prior::Prior;
-use pulp::{Simd, WithSimd};
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, BinaryHeap};
 
@@ -91,51 +90,25 @@ impl Care {
 
 /// Runs a search.
 fn run(reduced: &Reduced<'_>, prior: &Prior, start: &Start<'_>) -> Found {
-    pulp::Arch::new().dispatch(Run {
+    let standard = &reduced.open;
+    let exchanges = exchanges(standard, prior, &reduced.active, true);
+    let mut walker = Walker::new(standard, prior);
+    reduced.certain.iter().for_each(|&b| walker.flip(b));
+    let mut search = Search {
+        known: BTreeMap::new(),
+        queue: BinaryHeap::new(),
+        sums: Sums::new(standard, reduced.shrinks()),
+        best: f64::NEG_INFINITY,
+        overrated: false,
+        looked: 0,
+        walker,
         reduced,
-        prior,
-        start,
-    })
-}
-
-struct Run<'a> {
-    reduced: &'a Reduced<'a>,
-    prior: &'a Prior,
-    start: &'a Start<'a>,
-}
-
-impl WithSimd for Run<'_> {
-    type Output = Found;
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) -> Found {
-        let Self {
-            reduced,
-            prior,
-            start,
-        } = self;
-        let standard = &reduced.open;
-        let exchanges = exchanges(standard, prior, &reduced.active, true);
-        let mut walker = Walker::new(standard, prior);
-        for &block in &reduced.certain {
-            walker.flip(simd, block);
-        }
-        let mut search = Search {
-            known: BTreeMap::new(),
-            queue: BinaryHeap::new(),
-            sums: Sums::new(standard, reduced.shrinks()),
-            best: f64::NEG_INFINITY,
-            overrated: false,
-            looked: 0,
-            walker,
-            reduced,
-            active: &reduced.active,
-            exchanges: &exchanges,
-            care: start.care,
-        };
-        search.begin(simd, start.warm);
-        search.expand(simd, start.budget)
-    }
+        active: &reduced.active,
+        exchanges: &exchanges,
+        care: start.care,
+    };
+    search.begin(start.warm);
+    search.expand(start.budget)
 }
 
 /// Runs the search on a problem from the first two of the given models; without any, from the empty one and, of up to [`MANY_COLUMNS`], the full one.
@@ -194,13 +167,7 @@ pub(super) fn shares(
 }
 
 /// Steepest ascent by flips of `active` components, then by exchanges, until neither helps.
-#[inline(always)]
-pub(super) fn climb<S: Simd>(
-    simd: S,
-    walker: &mut Walker<'_>,
-    active: &[usize],
-    exchanges: &[Exchange],
-) {
+pub(super) fn climb(walker: &mut Walker<'_>, active: &[usize], exchanges: &[Exchange]) {
     for _ in 0..4 * active.len() + 4 {
         let best = active
             .iter()
@@ -209,7 +176,7 @@ pub(super) fn climb<S: Simd>(
         if let Some((gain, block)) = best
             && gain > 1e-9
         {
-            walker.flip(simd, block);
+            walker.flip(block);
             continue;
         }
         let step = exchanges
@@ -218,7 +185,7 @@ pub(super) fn climb<S: Simd>(
             .map(|step| (walker.exchange_gain(&step).0, step))
             .max_by(|a, b| a.0.total_cmp(&b.0));
         match step {
-            Some((gain, step)) if gain > 1e-9 => walker.take(simd, &step),
+            Some((gain, step)) if gain > 1e-9 => walker.take(&step),
             _ => return,
         }
     }
@@ -275,19 +242,17 @@ impl Search<'_> {
     }
 
     /// Walks to a model.
-    #[inline(always)]
-    fn go<S: Simd>(&mut self, simd: S, set: &[u64]) {
+    fn go(&mut self, set: &[u64]) {
         for index in 0..self.active.len() {
             let block = self.active[index];
             if self.walker.tableau.holds(block) != (set[block / 64] >> (block % 64) & 1 == 1) {
-                self.walker.flip(simd, block);
+                self.walker.flip(block);
             }
         }
     }
 
     /// Climbs from the given models, or from the empty one and, where the columns are not very many, the full one.
-    #[inline(always)]
-    fn begin<S: Simd>(&mut self, simd: S, warm: &[Vec<usize>]) {
+    fn begin(&mut self, warm: &[Vec<usize>]) {
         let words = self.walker.standard.blocks.len().div_ceil(64);
         let bits = |blocks: &[usize]| {
             let mut set = vec![0u64; words];
@@ -303,14 +268,14 @@ impl Search<'_> {
         }
         let mut found: Vec<(f64, Set)> = Vec::new();
         for set in starts {
-            self.go(simd, &set);
-            climb(simd, &mut self.walker, self.active, self.exchanges);
+            self.go(&set);
+            climb(&mut self.walker, self.active, self.exchanges);
             found.push((self.walker.log_weight(), self.set()));
         }
         found.sort_by(|a, b| b.0.total_cmp(&a.0).then_with(|| a.1.cmp(&b.1)));
         self.sums.reference = f64::NEG_INFINITY;
         for (_, set) in found {
-            self.go(simd, &set);
+            self.go(&set);
             self.add_present();
         }
     }
@@ -338,7 +303,6 @@ impl Search<'_> {
     }
 
     /// All models one component away from the present one, which is `set`.
-    #[inline(always)]
     fn neighbours(&mut self, set: &[u64]) {
         let now = self.walker.log_weight();
         for index in 0..self.active.len() {
@@ -416,8 +380,7 @@ impl Search<'_> {
         }
     }
 
-    #[inline(always)]
-    fn expand<S: Simd>(mut self, simd: S, budget: usize) -> Found {
+    fn expand(mut self, budget: usize) -> Found {
         // Mass that was expanded, in all and lately, and what it brought lately.
         let (mut expanded, mut recent, mut brought) = (0.0, 0.0, 0.0);
         let mut missing = 0.0;
@@ -426,7 +389,7 @@ impl Search<'_> {
                 missing = 0.0;
                 break;
             };
-            self.go(simd, &next.set);
+            self.go(&next.set);
             let (mut before, reference) = (self.sums.total(), self.sums.reference);
             self.neighbours(&next.set);
             if next.log_weight > self.best + EXCHANGED {

@@ -13,7 +13,7 @@
 
 use super::standard::Standard;
 use crate::lanes::LANES;
-use pulp::Simd;
+use pulp::{Simd, WithSimd};
 
 /// Moves after which rounding is swept away by starting afresh.
 const MOVES_BETWEEN_SWEEPS: usize = 2000;
@@ -138,13 +138,11 @@ impl<'a> Tableau<'a> {
     }
 
     /// Moves a component in or out. Where that made it start afresh: `ln |A_zz| Π v` of the model, free of rounding.
-    #[inline(always)]
-    pub(super) fn flip_block<S: Simd>(&mut self, simd: S, block: usize) -> Option<f64> {
-        for j in self.standard.blocks[block].range() {
-            self.flip(simd, j);
-        }
-        (self.moves >= MOVES_BETWEEN_SWEEPS || self.rounding > self.most_rounding)
-            .then(|| self.sweep(simd))
+    pub(super) fn flip_block(&mut self, block: usize) -> Option<f64> {
+        pulp::Arch::new().dispatch(FlipBlock {
+            tableau: self,
+            block,
+        })
     }
 
     /// `(d, gradientᵀ block⁻¹ gradient)` of a component that is wholly in or out: moving it multiplies the weight by
@@ -413,6 +411,26 @@ impl<'a> Tableau<'a> {
                 -slopes[k]
             };
         }
+    }
+}
+
+/// [`Tableau::flip_block`]. Who walks is compiled once, and this once for every set of instructions.
+struct FlipBlock<'b, 'a> {
+    tableau: &'b mut Tableau<'a>,
+    block: usize,
+}
+
+impl WithSimd for FlipBlock<'_, '_> {
+    type Output = Option<f64>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
+        let Self { tableau, block } = self;
+        for j in tableau.standard.blocks[block].range() {
+            tableau.flip(simd, j);
+        }
+        (tableau.moves >= MOVES_BETWEEN_SWEEPS || tableau.rounding > tableau.most_rounding)
+            .then(|| tableau.sweep(simd))
     }
 }
 

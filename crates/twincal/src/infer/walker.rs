@@ -11,7 +11,6 @@ use super::pivot::Pivot;
 use super::standard::Standard;
 use super::tableau::Tableau;
 use crate::prior::Prior;
-use pulp::Simd;
 
 /// See the module's text. Components are numbered by their place in `standard.blocks`.
 pub(super) struct Walker<'a> {
@@ -77,8 +76,7 @@ impl<'a> Walker<'a> {
     }
 
     /// Moves a component in or out.
-    #[inline(always)]
-    pub(super) fn flip<S: Simd>(&mut self, simd: S, block: usize) {
+    pub(super) fn flip(&mut self, block: usize) {
         let own = self.standard.blocks[block];
         let (d, _) = self.tableau.block(block);
         let factor = own.factor * own.factor;
@@ -92,7 +90,7 @@ impl<'a> Walker<'a> {
         if !SMALL.contains(&self.squared) {
             self.log_slab += 0.5 * std::mem::replace(&mut self.squared, 1.0).ln();
         }
-        if let Some(log_determinant) = self.tableau.flip_block(simd, block) {
+        if let Some(log_determinant) = self.tableau.flip_block(block) {
             let held = |b: &usize| self.tableau.holds(*b);
             let factors: f64 = (0..self.standard.blocks.len())
                 .filter(held)
@@ -104,10 +102,9 @@ impl<'a> Walker<'a> {
     }
 
     /// Takes a step.
-    #[inline(always)]
-    pub(super) fn take<S: Simd>(&mut self, simd: S, step: &Step) {
+    pub(super) fn take(&mut self, step: &Step) {
         for &block in step.leaving.iter().chain(&step.entering) {
-            self.flip(simd, block);
+            self.flip(block);
         }
     }
 

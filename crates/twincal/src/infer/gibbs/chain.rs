@@ -75,23 +75,6 @@ pub(super) struct Trace {
     pub(super) moves: u64,
 }
 
-/// Runs one chain.
-pub(super) fn run(target: Target<'_>, seed: u64, chain: usize, length: Length) -> Trace {
-    pulp::Arch::new().dispatch(Run {
-        target,
-        seed,
-        chain,
-        length,
-    })
-}
-
-struct Run<'a> {
-    target: Target<'a>,
-    seed: u64,
-    chain: usize,
-    length: Length,
-}
-
 /// Numbers of `conditional`, of `jumped` and of `beta` in the [`Trace`] of so many draws.
 fn lengths(reduced: &Reduced<'_>, draws: usize) -> [usize; 3] {
     let (count, size) = (reduced.open.blocks.len(), reduced.full.size());
@@ -105,62 +88,58 @@ pub(super) fn bytes(reduced: &Reduced<'_>, draws: usize) -> u64 {
     numbers.saturating_mul(size_of::<f32>() as u64)
 }
 
-impl WithSimd for Run<'_> {
-    type Output = Trace;
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) -> Trace {
-        self.run(simd)
+/// Runs one chain.
+pub(super) fn run(target: Target<'_>, seed: u64, chain: usize, length: Length) -> Trace {
+    let (size, count) = (target.reduced.full.size(), target.reduced.open.blocks.len());
+    let mut state = Chain::new(target, Source::new(seed, chain as u64));
+    state.start(chain);
+    let [conditional, jumped, beta] =
+        lengths(target.reduced, length.draws).map(|numbers| vec![0.0; numbers]);
+    let mut trace = Trace {
+        conditional,
+        jumped,
+        listed: 0,
+        beta,
+        shift: vec![0.0; size],
+        moment: vec![0.0; size],
+        inclusion: vec![0.0; count],
+        jumped_inclusion: vec![0.0; count],
+        misfit: 0.0,
+        visits: BTreeMap::new(),
+        moves: 0,
+    };
+    let instructions = pulp::Arch::new();
+    for scan in 0..length.warm_up * length.scans_per_draw {
+        instructions.dispatch(Scan(&mut state));
+        if scan % (JUMP_EVERY * length.scans_per_draw) == 0 {
+            state.settle_in(target.jumps);
+            state.jump(target.jumps);
+        }
     }
+    state.moves = 0;
+    for draw in 0..length.draws {
+        state.sums.fill(0.0);
+        for _ in 0..length.scans_per_draw {
+            instructions.dispatch(Scan(&mut state));
+        }
+        state.record(&mut trace, draw, length, target.jumps);
+        if draw % JUMP_EVERY == 0 {
+            state.jump(target.jumps);
+        }
+    }
+    trace.moves = state.moves;
+    trace
 }
 
-impl Run<'_> {
+/// One scan, with what the processor has.
+struct Scan<'c, 'a>(&'c mut Chain<'a>);
+
+impl WithSimd for Scan<'_, '_> {
+    type Output = ();
+
     #[inline(always)]
-    fn run<S: Simd>(self, simd: S) -> Trace {
-        let Self {
-            target,
-            seed,
-            chain,
-            length,
-        } = self;
-        let (size, count) = (target.reduced.full.size(), target.reduced.open.blocks.len());
-        let mut state = Chain::new(simd, target, Source::new(seed, chain as u64));
-        state.start(simd, chain);
-        let [conditional, jumped, beta] =
-            lengths(target.reduced, length.draws).map(|numbers| vec![0.0; numbers]);
-        let mut trace = Trace {
-            conditional,
-            jumped,
-            listed: 0,
-            beta,
-            shift: vec![0.0; size],
-            moment: vec![0.0; size],
-            inclusion: vec![0.0; count],
-            jumped_inclusion: vec![0.0; count],
-            misfit: 0.0,
-            visits: BTreeMap::new(),
-            moves: 0,
-        };
-        for scan in 0..length.warm_up * length.scans_per_draw {
-            state.scan(simd);
-            if scan % (JUMP_EVERY * length.scans_per_draw) == 0 {
-                state.settle_in(simd, target.jumps);
-                state.jump(simd, target.jumps);
-            }
-        }
-        state.moves = 0;
-        for draw in 0..length.draws {
-            state.sums.fill(0.0);
-            for _ in 0..length.scans_per_draw {
-                state.scan(simd);
-            }
-            state.record(&mut trace, draw, length, target.jumps);
-            if draw % JUMP_EVERY == 0 {
-                state.jump(simd, target.jumps);
-            }
-        }
-        trace.moves = state.moves;
-        trace
+    fn with_simd<S: Simd>(self, simd: S) {
+        self.0.scan(simd);
     }
 }
 
@@ -203,15 +182,11 @@ struct Chain<'a> {
 }
 
 impl<'a> Chain<'a> {
-    #[inline(always)]
-    fn new<S: Simd>(simd: S, target: Target<'a>, mut source: Source) -> Self {
+    fn new(target: Target<'a>, mut source: Source) -> Self {
         let standard = &target.reduced.open;
         let mut walker = Walker::new(standard, target.prior);
         let (certain, active) = (&target.reduced.certain, target.reduced.active.clone());
-        // No closure: it would not be compiled for the instructions of its place.
-        for &block in certain {
-            walker.flip(simd, block);
-        }
+        certain.iter().for_each(|&block| walker.flip(block));
         let chunks: Vec<Chunk> = active
             .chunks(LANES)
             .map(|blocks| Chunk::new(standard, blocks))
@@ -261,8 +236,7 @@ impl<'a> Chain<'a> {
     }
 
     /// Over-dispersed starts: empty, nearly full, half, a few.
-    #[inline(always)]
-    fn start<S: Simd>(&mut self, simd: S, chain: usize) {
+    fn start(&mut self, chain: usize) {
         let count = self.active.len();
         // More than 100 members at the start would only cost time: they leave within a scan.
         let share = [0.0, 0.9, 0.5, 0.1][chain % 4] * (100.0 / count as f64).min(1.0);
@@ -270,7 +244,7 @@ impl<'a> Chain<'a> {
             // Odds of 0: a child whose parent is out.
             let block = self.active[index];
             if self.source.uniform() < share && self.walker.flip_odds(block) > 0.0 {
-                self.flip(simd, block);
+                self.flip(block);
             }
         }
         self.weigh_present();
@@ -285,9 +259,8 @@ impl<'a> Chain<'a> {
         }
     }
 
-    #[inline(always)]
-    fn flip<S: Simd>(&mut self, simd: S, block: usize) {
-        self.walker.flip(simd, block);
+    fn flip(&mut self, block: usize) {
+        self.walker.flip(block);
         let family = self.walker.standard.blocks[block].family;
         self.family_odds[family] = self.walker.family_odds(family);
         self.update_odds();
@@ -339,7 +312,7 @@ impl<'a> Chain<'a> {
                 }
                 let block = self.active[index * LANES + lane];
                 let guide = self.guide(block);
-                self.attempt(simd, &[block], guide);
+                self.attempt(&[block], guide);
                 self.renew();
                 from = lane + 1;
             }
@@ -349,15 +322,14 @@ impl<'a> Chain<'a> {
         }
         if !self.exchanges.is_empty() {
             for _ in 0..EXCHANGES {
-                self.exchange(simd);
+                self.exchange();
             }
         }
     }
 
     /// Proposes one exchange, drawn uniformly; void unless one side is wholly in and the other wholly out, which it is
     /// there and back with the same probability.
-    #[inline(always)]
-    fn exchange<S: Simd>(&mut self, simd: S) {
+    fn exchange(&mut self) {
         let index = (self.source.uniform() * self.exchanges.len() as f64) as usize;
         let Some(step) = self.exchanges[index].step(&self.walker) else {
             return;
@@ -365,7 +337,7 @@ impl<'a> Chain<'a> {
         let (gain, ..) = self.walker.exchange_gain(&step);
         if self.source.uniform() < exchange_chance(gain) {
             let blocks = [step.leaving, step.entering].concat();
-            self.attempt(simd, &blocks, 0.0);
+            self.attempt(&blocks, 0.0);
         }
     }
 
@@ -389,36 +361,33 @@ impl<'a> Chain<'a> {
     }
 
     /// A Gibbs step over the listed models, see [`Jumps`].
-    #[inline(always)]
-    fn jump<S: Simd>(&mut self, simd: S, jumps: &Jumps) {
+    fn jump(&mut self, jumps: &Jumps) {
         if self.is_listed(jumps) {
             let model = jumps.draw(self.source.uniform());
-            self.go(simd, jumps, model);
+            self.go(jumps, model);
         }
     }
 
     /// While a chain warms up: to a listed model that weighs more than an unlisted one where the chain may be caught between bounds.
-    #[inline(always)]
-    fn settle_in<S: Simd>(&mut self, simd: S, jumps: &Jumps) {
+    fn settle_in(&mut self, jumps: &Jumps) {
         if jumps.is_empty() || self.is_listed(jumps) {
             return;
         }
         let model = jumps.draw(self.source.uniform());
         let bounds = self.admission.as_ref().map_or(0.0, |own| own.present());
         if jumps.log_weight(model) > self.walker.log_weight() + bounds {
-            self.go(simd, jumps, model);
+            self.go(jumps, model);
         }
     }
 
     /// To a listed model.
-    #[inline(always)]
-    fn go<S: Simd>(&mut self, simd: S, jumps: &Jumps, model: usize) {
+    fn go(&mut self, jumps: &Jumps, model: usize) {
         let goal = jumps.set(model);
         let mut changes = 0;
         for block in 0..self.walker.standard.blocks.len() {
             let inside = goal[block / 64] >> (block % 64) & 1 == 1;
             if self.walker.tableau.holds(block) != inside {
-                self.flip(simd, block);
+                self.flip(block);
                 changes += 1;
             }
         }
@@ -457,14 +426,13 @@ impl<'a> Chain<'a> {
             };
             left -= proposal;
             let blocks = group.pick(self.source.uniform());
-            self.attempt(simd, &blocks, 0.0);
+            self.attempt(&blocks, 0.0);
             self.renew();
         }
     }
 
     /// φ | z, then each β_k | z, φ; sums that need no draw use the conditional expectations. z is the present model, or where
     /// that is listed one drawn from the list: the chain need not go there.
-    #[inline(always)]
     fn record(&mut self, trace: &mut Trace, draw: usize, length: Length, jumps: &Jumps) {
         let reduced = self.reduced;
         let listed = self.is_listed(jumps);

@@ -11,7 +11,6 @@ use crate::infer::reduced::{Reduced, Response};
 use crate::infer::search::{self, Care, Set};
 use crate::infer::walker::Walker;
 use crate::posterior::{Posterior, Problem};
-use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 
@@ -181,57 +180,37 @@ fn walked(
     models.sort_unstable();
     models
         .par_chunks(PIECE)
-        .flat_map_iter(|models| {
-            pulp::Arch::new().dispatch(Walk {
-                reduced,
-                problem,
-                models,
-                moments,
-            })
-        })
+        .flat_map_iter(|models| piece(models, reduced, problem, moments))
         .collect()
 }
 
-/// Goes from model to model.
-struct Walk<'a> {
-    reduced: &'a Reduced<'a>,
-    problem: &'a Problem,
-    models: &'a [Set],
+/// [`walked`], one piece.
+fn piece(
+    models: &[Set],
+    reduced: &Reduced<'_>,
+    problem: &Problem,
     moments: bool,
-}
-
-impl WithSimd for Walk<'_> {
-    type Output = Vec<(Set, f64, f64, State)>;
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
-        let standard = &self.reduced.open;
-        let mut walker = Walker::new(standard, &self.problem.prior);
-        let mut response = Response::default();
-        let mut masses = bounds::SlabMasses::default();
-        self.models
-            .iter()
-            .map(|set| {
-                for block in 0..standard.blocks.len() {
-                    if walker.tableau.holds(block) != (set[block / 64] >> (block % 64) & 1 == 1) {
-                        walker.flip(simd, block);
-                    }
-                }
-                let mut state = State::default();
-                if self.moments {
-                    state.read(self.reduced, &walker.tableau, &mut response);
-                }
-                let log_ratio = match self.reduced.full.bounded {
-                    true => bounds::log_ratio(self.reduced, &walker.tableau, set, &mut masses),
-                    false => 0.0,
-                };
-                (
-                    set.clone(),
-                    walker.log_weight() + log_ratio,
-                    log_ratio,
-                    state,
-                )
-            })
-            .collect()
-    }
+) -> Vec<(Set, f64, f64, State)> {
+    let standard = &reduced.open;
+    let mut walker = Walker::new(standard, &problem.prior);
+    let mut response = Response::default();
+    let mut masses = bounds::SlabMasses::default();
+    let walked = models.iter().map(|set| {
+        for block in 0..standard.blocks.len() {
+            if walker.tableau.holds(block) != (set[block / 64] >> (block % 64) & 1 == 1) {
+                walker.flip(block);
+            }
+        }
+        let mut state = State::default();
+        if moments {
+            state.read(reduced, &walker.tableau, &mut response);
+        }
+        let log_ratio = match reduced.full.bounded {
+            true => bounds::log_ratio(reduced, &walker.tableau, set, &mut masses),
+            false => 0.0,
+        };
+        let log_weight = walker.log_weight() + log_ratio;
+        (set.clone(), log_weight, log_ratio, state)
+    });
+    walked.collect()
 }

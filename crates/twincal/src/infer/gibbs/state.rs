@@ -16,7 +16,6 @@ pub(super) struct State {
 
 impl State {
     /// Of the model in the tableau. `response` is room to work in.
-    #[inline(always)]
     pub(super) fn read(
         &mut self,
         reduced: &Reduced<'_>,

@@ -308,7 +308,7 @@ mod tests {
         let mut swaps = Swaps::new(&standard, &all);
         let (mut compared, mut uncertain) = (0, 0);
         for scan in 0..40 {
-            walker.flip(simd, (7 * scan + scan / 9) % all.len());
+            walker.flip((7 * scan + scan / 9) % all.len());
             let before = walker.log_weight();
             for index in 0..swaps.groups.len() {
                 let group = swaps.group(simd, index, &walker, 1 + scan as u64).clone();
@@ -329,9 +329,9 @@ mod tests {
                         leaving: there.entering.clone(),
                         entering: there.leaving.clone(),
                     };
-                    walker.take(simd, &there);
+                    walker.take(&there);
                     let ratio = (walker.log_weight() - before).exp().min(1.0);
-                    walker.take(simd, &back);
+                    walker.take(&back);
                     assert!((accepted - ratio).abs() < 1e-9, "{accepted} {ratio}");
                     compared += 1;
                     uncertain += usize::from(ratio > 1e-3 && ratio < 0.999);

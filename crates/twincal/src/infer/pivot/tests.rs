@@ -24,7 +24,7 @@ fn the_moments_are_those_of_the_model_after_the_walk() {
         let size = standard.size();
         let beside = dense(&present(&walker, true).joint, size, &[]);
         let covariance = dense(&got.joint, size, &beside);
-        walker.flip(pulp::Scalar::new(), block);
+        walker.flip(block);
         let truth = present(&walker, true);
         alike(&got, &truth, &covariance, &Step::default());
         let (inside, outside): (Vec<usize>, Vec<usize>) =
@@ -47,13 +47,13 @@ fn compare(walker: &mut Walker<'_>, step: &Step) {
     let before = walker.log_weight();
     let (gain, excess, pivot) = walker.exchange_gain(step);
     let got = after_exchange(walker, step, &pivot, excess, true);
-    walker.take(pulp::Scalar::new(), step);
+    walker.take(step);
     let (then, truth) = (walker.log_weight(), present(walker, true));
     let back = Step {
         leaving: step.entering.clone(),
         entering: step.leaving.clone(),
     };
-    walker.take(pulp::Scalar::new(), &back);
+    walker.take(&back);
     assert!(
         (before + gain - then).abs() < 1e-7 * (1.0 + then.abs()),
         "{step:?}: weight off by {}",

@@ -22,12 +22,12 @@ fn summed(problem: &Problem, shrink: bool) -> (Averages, f64, bool) {
     let mut sums = Sums::new(&reduced.open, reduced.shrinks());
     sums.reference = f64::NEG_INFINITY;
     for &block in &reduced.certain {
-        walker.flip(pulp::Scalar::new(), block);
+        walker.flip(block);
     }
     for set in 0u64..1 << reduced.active.len() {
         for (bit, &block) in reduced.active.iter().enumerate() {
             if walker.tableau.holds(block) != (set >> bit & 1 == 1) {
-                walker.flip(pulp::Scalar::new(), block);
+                walker.flip(block);
             }
         }
         walker.tableau.refine();
@@ -136,7 +136,7 @@ fn what_is_gone_follows_what_is_left() {
     for set in 0u64..1 << reduced.open.blocks.len() {
         for block in 0..reduced.open.blocks.len() {
             if walker.tableau.holds(block) != (set >> block & 1 == 1) {
-                walker.flip(pulp::Scalar::new(), block);
+                walker.flip(block);
             }
         }
         let tableau = &walker.tableau;

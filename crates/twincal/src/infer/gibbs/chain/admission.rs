@@ -20,7 +20,6 @@ use crate::infer::tableau::Tableau;
 use crate::lanes::{LANES, Lane};
 use crate::linear_algebra::Cholesky;
 use crate::prior::HalfSpace;
-use pulp::Simd;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
@@ -269,10 +268,9 @@ impl Chain<'_> {
     }
 
     /// Moves components that the first stage accepted with this guide, if the bounds admit it.
-    #[inline(always)]
-    pub(super) fn attempt<S: Simd>(&mut self, simd: S, blocks: &[usize], guide: f64) {
+    pub(super) fn attempt(&mut self, blocks: &[usize], guide: f64) {
         let Some(admission) = &self.admission else {
-            self.move_all(simd, blocks);
+            self.move_all(blocks);
             return;
         };
         let uniform = self.source.uniform();
@@ -286,7 +284,7 @@ impl Chain<'_> {
         if known.is_some_and(|log_ratio| !admits(log_ratio)) {
             return;
         }
-        self.move_all(simd, blocks);
+        self.move_all(blocks);
         let log_ratio = match (known, &mut self.admission) {
             (Some(log_ratio), _) => log_ratio,
             (None, Some(own)) => {
@@ -296,7 +294,7 @@ impl Chain<'_> {
         };
         let admitted = admits(log_ratio);
         if !admitted {
-            self.move_all(simd, blocks);
+            self.move_all(blocks);
             self.moves -= 2;
         }
         if let Some(admission) = &mut self.admission {
@@ -310,10 +308,9 @@ impl Chain<'_> {
     }
 
     /// Moves components, as one move.
-    #[inline(always)]
-    fn move_all<S: Simd>(&mut self, simd: S, blocks: &[usize]) {
+    fn move_all(&mut self, blocks: &[usize]) {
         for &block in blocks {
-            self.flip(simd, block);
+            self.flip(block);
         }
         self.moves -= blocks.len() as u64 - 1;
     }
