@@ -1,6 +1,7 @@
 //! Scores one held-out trajectory after another: filtered, moving and raw rows, coverage, guarantee, traces.
 
 use super::conformal::stretch;
+use super::memory::ErrorMemory;
 use super::{
     ConformalKeeper, Moments, PitKeeper, Reliability, RivalKeeper, ScoreKeeper, Scores, Split,
     Trace, TraceRows, Validation,
@@ -24,6 +25,8 @@ pub struct HeldOut {
     moving: ScoreKeeper,
     /// Moving rows that the training data speak of, and those beyond, see [`Validation::beyond`].
     within: ScoreKeeper,
+    /// Per joint, of the rows of `within`.
+    memory: Vec<ErrorMemory>,
     beyond: ScoreKeeper,
     /// Of each joint, rows beyond whose motion is new.
     new_motion: Vec<u64>,
@@ -100,6 +103,7 @@ impl HeldOut {
         Self {
             pit: vec![PitKeeper::default(); names.len()],
             new_motion: vec![0; names.len()],
+            memory: vec![ErrorMemory::default(); names.len()],
             names,
             filtered: keeper.clone(),
             moving: keeper.clone(),
@@ -330,9 +334,11 @@ impl HeldOut {
             let moves: Vec<f64> = moves.map(|(pit, _)| *pit).collect();
             self.pit[joint].push(&moves, predictors.twin.memory(joint));
             let outside = &torque.extrapolating;
-            self.within.push_where(joint, measured, torque, |row| {
-                !standstill[row] && !outside[row]
-            });
+            let within = |row: usize| !standstill[row] && !outside[row];
+            self.within.push_where(joint, measured, torque, within);
+            let errors = measured.iter().zip(&torque.calibrated);
+            let errors: Vec<f64> = errors.map(|(measured, own)| measured - own).collect();
+            self.memory[joint].push(&errors, within);
             self.beyond.push_where(joint, measured, torque, |row| {
                 !standstill[row] && outside[row]
             });
@@ -351,6 +357,11 @@ impl HeldOut {
     /// Scores of the moving rows within the training motion, see [`Validation::within`].
     pub(crate) fn within(&self) -> Scores {
         self.within.scores()
+    }
+
+    /// Of each joint, how many of those rows count as one, by their own errors.
+    pub(crate) fn memory_within(&self) -> Vec<f64> {
+        self.memory.iter().map(ErrorMemory::rows).collect()
     }
 
     /// The scores of everything seen.
@@ -410,6 +421,9 @@ impl AddAssign for HeldOut {
         self.filtered += &other.filtered;
         self.moving += &other.moving;
         self.within += &other.within;
+        for (own, more) in self.memory.iter_mut().zip(other.memory) {
+            *own += more;
+        }
         self.beyond += &other.beyond;
         for (own, more) in self.new_motion.iter_mut().zip(&other.new_motion) {
             *own += more;

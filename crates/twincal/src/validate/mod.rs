@@ -4,6 +4,7 @@ mod changed_payload;
 mod changes;
 mod conformal;
 mod heldout;
+mod memory;
 mod misread;
 mod moments;
 mod pit;

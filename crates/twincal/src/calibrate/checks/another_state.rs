@@ -8,16 +8,22 @@ const LEVEL: f64 = 0.70;
 /// Standard deviations by which it is below that: one in twenty joints whose true share is 0.70; of joints that hold 95 %, fewer than one in 10⁵
 /// with five independent rows or more.
 const CLEAR: f64 = 1.645;
-/// Independent rows below which nothing is said.
+/// Independent rows below which nothing is said. What is left of a log in another state lasts as long as the log: by that it counts for so many.
 const FEWEST: f64 = 5.0;
 
-/// Of the moving rows of log `log` within the training motion; `memory` rows of each joint count as one.
-pub(in crate::calibrate) fn finding(log: &str, within: &Scores, memory: &[f64]) -> Option<Finding> {
-    let joints = within.joints.iter().zip(memory);
+/// Of the moving rows of log `log` within the training motion; of each joint so many rows count as one by the `noise`, and by what is left of
+/// this log, its `own`, which lasts longer where the library lacks something that comes back with the motion.
+pub(in crate::calibrate) fn finding(
+    log: &str,
+    within: &Scores,
+    (noise, own): (&[f64], &[f64]),
+) -> Option<Finding> {
+    let joints = within.joints.iter().zip(noise.iter().zip(own));
     let mut least = 1.0_f64;
     let low: Vec<String> = joints
-        .filter(|(score, memory)| {
-            let independent = score.rows as f64 / *memory;
+        .filter(|(score, (noise, own))| {
+            let rows = score.rows as f64;
+            let independent = (rows / **noise).min((rows / **own).max(FEWEST));
             let sd = (LEVEL * (1.0 - LEVEL) / independent).sqrt();
             independent >= FEWEST && score.coverage95 + CLEAR * sd < LEVEL
         })
@@ -78,7 +84,8 @@ mod tests {
 
     #[test]
     fn shares_clearly_below_seventy_percent_are_told_by_independent_rows() {
-        let says = |rows, memory, inside| finding("run", &scores(rows, inside), &[memory]);
+        let says =
+            |rows, memory, inside| finding("run", &scores(rows, inside), (&[memory], &[1.0]));
         let told = says(200, 2.0, 0.55).expect("15 points below with an sd of 4.6");
         assert_eq!((told.subject.as_str(), told.count), ("run", 1));
         assert!(told.message.contains("55 % of joint `a`"), "{told:?}");
@@ -87,5 +94,11 @@ mod tests {
         assert!(says(200, 40.0, 0.55).is_none() && says(20, 2.0, 0.55).is_none());
         assert!(says(200, 2.0, 0.65).is_none() && says(200, 2.0, 0.93).is_none());
         assert!(says(0, 2.0, 0.5).is_none());
+        // What is left lasts for 20 rows: ten independent ones, an sd of 14 points.
+        let lasting = |inside| finding("run", &scores(200, inside), (&[2.0], &[20.0]));
+        assert!(lasting(0.55).is_none() && lasting(0.4).is_some());
+        // It does not change at all: five, an sd of 20 points.
+        let staying = |inside| finding("run", &scores(200, inside), (&[2.0], &[1999.0]));
+        assert!(staying(0.4).is_none() && staying(0.3).is_some());
     }
 }

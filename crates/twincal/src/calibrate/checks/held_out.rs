@@ -141,7 +141,7 @@ pub(in crate::calibrate) fn validate(
                 findings.extend(another_state::finding(
                     &left_out.rows.log,
                     &own.within(),
-                    &memory,
+                    (&memory, &own.memory_within()),
                 ));
             }
             held_out += own;
