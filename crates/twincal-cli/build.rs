@@ -1,4 +1,4 @@
-//! Strips the program, which `strip = true` does not: cargo forgets that where a package has an `opt-level` of its own.
+//! Strips the program, which `strip = true` does not: cargo forgets that where a package sets `opt-level`.
 
 #![allow(clippy::print_stdout, reason = "how a build script speaks to cargo")]
 

@@ -233,7 +233,7 @@ mod tests {
         let band = edges
             .windows(2)
             .position(|e| e[0] <= 0.03 && 0.03 < e[1])
-            .expect("a band");
+            .expect("0.03 is below half a cycle per row");
         assert!(power[band].at(0, 0) > 0.98 * 2048.0);
         assert!(power[0].at(1, 1) > 0.985 * 4096.0);
     }

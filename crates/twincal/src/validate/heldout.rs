@@ -337,7 +337,9 @@ impl HeldOut {
             let within = |row: usize| !standstill[row] && !outside[row];
             self.within.push_where(joint, measured, torque, within);
             let errors = measured.iter().zip(&torque.calibrated);
-            let errors: Vec<f64> = errors.map(|(measured, own)| measured - own).collect();
+            let errors: Vec<f64> = errors
+                .map(|(measured, calibrated)| measured - calibrated)
+                .collect();
             self.memory[joint].push(&errors, within);
             self.beyond.push_where(joint, measured, torque, |row| {
                 !standstill[row] && outside[row]

@@ -11,19 +11,19 @@ const CLEAR: f64 = 1.645;
 /// Independent rows below which nothing is said. What is left of a log in another state lasts as long as the log: by that it counts for so many.
 const FEWEST: f64 = 5.0;
 
-/// Of the moving rows of log `log` within the training motion; of each joint so many rows count as one by the `noise`, and by what is left of
-/// this log, its `own`, which lasts longer where the library lacks something that comes back with the motion.
+/// Of the moving rows of log `log` within the training motion; of each joint so many rows count as one by the `noise`, and by the
+/// `residual` of this log, which lasts longer where the library lacks something that comes back with the motion.
 pub(in crate::calibrate) fn finding(
     log: &str,
     within: &Scores,
-    (noise, own): (&[f64], &[f64]),
+    (noise, residual): (&[f64], &[f64]),
 ) -> Option<Finding> {
-    let joints = within.joints.iter().zip(noise.iter().zip(own));
+    let joints = within.joints.iter().zip(noise.iter().zip(residual));
     let mut least = 1.0_f64;
     let low: Vec<String> = joints
-        .filter(|(score, (noise, own))| {
+        .filter(|(score, (noise, residual))| {
             let rows = score.rows as f64;
-            let independent = (rows / **noise).min((rows / **own).max(FEWEST));
+            let independent = (rows / **noise).min((rows / **residual).max(FEWEST));
             let sd = (LEVEL * (1.0 - LEVEL) / independent).sqrt();
             independent >= FEWEST && score.coverage95 + CLEAR * sd < LEVEL
         })
