@@ -56,6 +56,7 @@ fn main() {
     let noise = JointNoise {
         joint: "elbow".into(),
         sigma: 0.7,
+        training_rmse: 0.0,
         rho: 0.0,
         weight: 1.0,
         n: 400.0,

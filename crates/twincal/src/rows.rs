@@ -125,21 +125,29 @@ pub fn slices(
     slices
 }
 
-/// Longest log whose raw rows are all scored.
-const ALL_RAW: usize = 1 << 15;
-/// Of a longer one so many are, in pieces: neighbours at a log's rate say nearly the same.
+/// Of a log with more than four times as many raw rows so many are scored, in pieces: neighbours at a log's rate say nearly the same.
 const SPREAD_RAW: usize = 1 << 13;
 const RAW_PIECE: usize = 1 << 8;
+/// Of many logs so many together, but not fewer of each, in at least four pieces.
+const SPREAD_RAW_TOGETHER: usize = 1 << 16;
+const LEAST_RAW: usize = 1 << 6;
 
-/// Raw rows at or after time `since` (s): all of a log of at most 32 768 rows, evenly spread pieces of a longer one, of
-/// 256 rows at most and about 8192 together.
-pub fn spread_raw(pipeline: &Pipeline, trajectory: &Trajectory, since: f64) -> Vec<Slice> {
-    let all = slices(pipeline, trajectory, RowSignal::Raw, since, RAW_PIECE);
+/// Raw rows at or after time `since` (s) of one of `logs` logs: all of a log of at most 32 768 rows, evenly spread pieces of a longer one, of
+/// 256 rows at most and about 8192 together; of more than eight logs fewer of each, in smaller pieces.
+pub fn spread_raw(
+    pipeline: &Pipeline,
+    trajectory: &Trajectory,
+    since: f64,
+    logs: usize,
+) -> Vec<Slice> {
+    let spread = (SPREAD_RAW_TOGETHER / logs.max(1)).clamp(LEAST_RAW, SPREAD_RAW);
+    let piece = RAW_PIECE.min(spread / 4);
+    let all = slices(pipeline, trajectory, RowSignal::Raw, since, piece);
     let rows: usize = all.iter().map(|slice| slice.rows.len()).sum();
-    if rows <= ALL_RAW {
+    if rows <= 4 * spread {
         return all;
     }
-    let kept = (all.len() * SPREAD_RAW).div_ceil(rows);
+    let kept = (all.len() * spread).div_ceil(rows);
     (0..kept)
         .map(|i| all[i * all.len() / kept].clone())
         .collect()

@@ -123,9 +123,9 @@ pub(super) fn run(flags: &Check, terminal: &mut Terminal) -> Outcome<u8> {
     } else {
         decisive(&gates, assessment.reason, &mut found, terminal);
     }
-    // One that is a warning is among the findings.
-    let notes = known.iter().filter(|own| own.severity == Severity::Note);
-    notes.for_each(|finding| paragraph(&finding.message, terminal));
+    for finding in &known {
+        paragraph(&finding.message, terminal);
+    }
     if says_something {
         left_out(&scored.misread, terminal);
     }
@@ -271,14 +271,14 @@ pub(super) fn role_in_fit<'a>(file: &FileHash, stored: &'a StoredTwin) -> Option
     Some(log.role.as_str())
 }
 
-/// Logs that the twin knows already, by their checksums: what they show is no news. Where no log is new it is a warning, and no pass.
+/// Logs that the twin knows already, by their checksums: a pass of them says that files and twin belong together, nothing of the robot since.
 fn known_logs(files: &[FileHash], stored: &StoredTwin) -> Vec<Finding> {
     let roles: Vec<Option<&str>> = (files.iter())
         .map(|file| role_in_fit(file, stored))
         .collect();
-    let (severity, remedy) = match roles.iter().all(Option::is_some) {
-        true => (Severity::Warning, "; check a log that is new to the twin"),
-        false => (Severity::Note, ""),
+    let remedy = match roles.iter().all(Option::is_some) {
+        true => "; check a log that is new to the twin",
+        false => "",
     };
     let known = |(file, role): (&FileHash, &Option<&str>)| {
         let (code, what) = match (*role)? {
@@ -292,7 +292,7 @@ fn known_logs(files: &[FileHash], stored: &StoredTwin) -> Vec<Finding> {
             ),
         };
         let message = format!("{}: this log is {what}{remedy}", file.name);
-        Some(Finding::new(severity, code, &file.name, message, 0))
+        Some(Finding::new(Severity::Note, code, &file.name, message, 0))
     };
     files.iter().zip(&roles).filter_map(known).collect()
 }

@@ -22,6 +22,8 @@ use twincal_io::{Error, memory};
 /// Doubles per sample and joint that alignment and filtering hold at once beside the recordings themselves: pieces on even clocks (4),
 /// smooth motion with torques (5), what passes by. What rows take is asked when it is known how many there are.
 const DOUBLES_PER_SAMPLE: u64 = 12;
+/// Bytes of logs from one question for memory to the next.
+const ASK_EVERY: u64 = 4 << 20;
 /// Logs that are named while they are read; of more every so many is.
 const MOST_SAID: usize = 20;
 
@@ -217,7 +219,7 @@ impl LogInput {
         progress: &Progress,
         read_one: &(dyn Fn(&Path) -> ReadLog + Sync),
     ) -> Outcome<Self> {
-        let mut samples = 0;
+        let (mut samples, mut asked) = (0, 0);
         let mut input = Self::new(paths.to_vec());
         let said = paths.len().div_ceil(MOST_SAID).max(1);
         for (number, (path, name)) in paths.iter().zip(names).enumerate() {
@@ -236,11 +238,14 @@ impl LogInput {
             let (log, findings) = log?;
             samples += in_memory(&log);
             let bytes = samples.saturating_mul(robot.dof() as u64 * 8 * DOUBLES_PER_SAMPLE);
-            memory::require(
-                &path.to_string_lossy(),
-                bytes,
-                "give fewer or shorter logs, or raise the limit",
-            )?;
+            if bytes >= asked + ASK_EVERY {
+                memory::require(
+                    &path.to_string_lossy(),
+                    bytes,
+                    "give fewer or shorter logs, or raise the limit",
+                )?;
+                asked = bytes;
+            }
             input.push(log, findings, &name);
             input.files.push(FileHash {
                 name,

@@ -266,6 +266,7 @@ fn joint_noise(names: &[&str], rows: f64) -> Vec<JointNoise> {
         .map(|(j, name)| JointNoise {
             joint: (*name).into(),
             sigma: 0.09 / (1.0 + j as f64),
+            training_rmse: 0.0,
             rho: 0.0,
             weight: 1.0 + 0.2 * j as f64,
             n: rows,

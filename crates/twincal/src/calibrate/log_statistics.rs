@@ -124,7 +124,8 @@ impl Statistics {
             });
         }
         let raw = raw((robot, &library), plan, &log, &trajectory)?;
-        let sums = LogSums::of(&log.observations.whole(), BLOCKS).with_runs(plan.runs());
+        let sums =
+            LogSums::of(&[&log.observations.whole()], BLOCKS, plan.runs()).with_runs(plan.runs());
         require_read_back(given)?;
         Ok(Self {
             robot_name: robot_name.to_owned(),

@@ -105,7 +105,7 @@ impl CommonFit {
             for (tau, rate) in own.block.measured.iter_mut().zip(&rate) {
                 *tau += lag * own.factor * rate;
             }
-            own.sum();
+            own.sum_torque();
         }
         self.solve();
     }
@@ -128,23 +128,24 @@ impl CommonFit {
         logs.iter().map(of).collect()
     }
 
-    /// The two joints of a log which exchange their torque with the least squares left, and by how much these fall.
-    pub(super) fn exchange(&self, log: usize) -> Option<([usize; 2], f64)> {
+    /// The log of these, and its two joints, which exchange their torque with the least squares left, and by how much these fall.
+    pub(super) fn exchange(&self, logs: &[usize]) -> Option<(usize, [usize; 2], f64)> {
         let so_far = self.right();
         let as_it_is = self.left_of(&so_far);
-        let own = self.rows_of(Some(log));
-        let pairs = own
-            .clone()
-            .flat_map(|a| (a + 1..own.end).map(move |b| (a, b)));
-        let gains = pairs.map(|(a, b)| {
+        let pairs = logs.iter().flat_map(|log| {
+            let own = self.rows_of(Some(*log));
+            own.clone()
+                .flat_map(move |a| (a + 1..own.end).map(move |b| (*log, a, b)))
+        });
+        let gains = pairs.map(|(log, a, b)| {
             let mut changed = so_far.clone();
             let [a, b] = [&self.rows[a], &self.rows[b]];
             a.replace(&mut changed, &b.block.measured);
             b.replace(&mut changed, &a.block.measured);
             let joints = [a.block.joint, b.block.joint];
-            (joints, as_it_is - self.left_of(&changed))
+            (log, joints, as_it_is - self.left_of(&changed))
         });
-        gains.max_by(|one, other| one.1.total_cmp(&other.1))
+        gains.max_by(|one, other| one.2.total_cmp(&other.2))
     }
 
     /// Exchanges the torque of two joints of a log, and fits again.
@@ -159,7 +160,7 @@ impl CommonFit {
         let first = std::mem::take(&mut self.rows[a].block.measured);
         self.rows[a].block.measured = std::mem::replace(&mut self.rows[b].block.measured, first);
         for own in [a, b] {
-            self.rows[own].sum();
+            self.rows[own].sum_torque();
         }
         self.solve();
     }
@@ -406,11 +407,13 @@ impl Rows {
             residual: Vec::new(),
             block,
         };
-        own.sum();
+        own.gram = own.products();
+        own.sum_torque();
         Some(own)
     }
 
-    fn sum(&mut self) {
+    /// Products of measured torque with the columns and with that of the model.
+    fn sum_torque(&mut self) {
         let [mut tau, mut nominal] = [self.block.measured.clone(), self.block.nominal.clone()];
         self.project(&mut tau);
         self.project(&mut nominal);
@@ -419,23 +422,32 @@ impl Rows {
             dot(&tau, &nominal),
             dot(&nominal, &nominal),
         ];
+        // What is off friction needs no second projection.
+        let columns = 0..self.block.columns.len();
+        self.right = [&tau, &nominal].map(|of| {
+            let products = columns.clone().map(|k| dot(self.block.column(k), of));
+            products.collect()
+        });
+    }
+
+    /// XᵀMX.
+    fn products(&self) -> Vec<f64> {
         let count = self.block.columns.len();
-        let projected: Vec<Vec<f64>> = (0..count)
-            .map(|k| {
-                let mut column = self.block.column(k).to_vec();
-                self.project(&mut column);
-                column
-            })
-            .collect();
-        self.right = [&tau, &nominal].map(|of| projected.iter().map(|x| dot(x, of)).collect());
-        self.gram = vec![0.0; count * count];
+        let projected = (0..count).map(|k| {
+            let mut column = self.block.column(k).to_vec();
+            self.project(&mut column);
+            column
+        });
+        let projected: Vec<Vec<f64>> = projected.collect();
+        let mut gram = vec![0.0; count * count];
         for (i, column) in projected.iter().enumerate() {
             for (j, other) in projected[..=i].iter().enumerate() {
                 let product = dot(column, other);
-                self.gram[i * count + j] = product;
-                self.gram[j * count + i] = product;
+                gram[i * count + j] = product;
+                gram[j * count + i] = product;
             }
         }
+        gram
     }
 
     /// Changes a right side and a sum of squares: by what is added to the products of torque with the columns, with that of the model, and to its square.

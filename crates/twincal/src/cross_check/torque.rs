@@ -206,11 +206,8 @@ fn late(fit: &CommonFit, names: &Names<'_>) -> Option<Finding> {
 
 /// The log and its two joints whose torque is exchanged there, and the shares of it that are explained before and after; the fit then has it exchanged.
 fn next_exchange(fit: &mut CommonFit) -> Option<(usize, [usize; 2], [f64; 2])> {
-    let logs = fit.logs();
-    let several = logs.len() > 1;
-    let all = logs.into_iter().filter(|_| several);
-    let gains = all.filter_map(|log| fit.exchange(log).map(|(joints, gain)| (log, joints, gain)));
-    let (log, joints, gain) = gains.max_by(|one, other| one.2.total_cmp(&other.2))?;
+    let logs = Some(fit.logs()).filter(|logs| logs.len() > 1)?;
+    let (log, joints, gain) = fit.exchange(&logs)?;
     let own = |block: &Block| block.log == log && joints.contains(&block.joint);
     let of = |fit: &CommonFit| (fit.squares(own), 1.0 - fit.left(own));
     let (before, explained) = of(fit);

@@ -38,9 +38,6 @@ const TABLE: &[(Code, Severity, Mistake)] = &[
     (Code::CommonFactor, Degraded, Mistake::Contradiction),
     // signal/clean/torque.rs; a warning where one joint of several is passive
     (Code::ConstantTorque, Degraded, Mistake::NoMeasurement),
-    // twincal check; a note where another log is new
-    (Code::LogWasFitted, Warning, Mistake::Copy),
-    (Code::LogWasHeldout, Warning, Mistake::Copy),
     // cross_check
     (Code::CopiedLog, Warning, Mistake::Copy),
     (Code::LogTorqueExchanged, Warning, Mistake::OddTorque),

@@ -185,8 +185,8 @@ table! {
     LogTorqueExchanged: Warning => "explained" "explained_before";
     LogTorqueFactor: Warning => "factor" "factor_sd";
     LogTorqueLag: Warning => "lag" "lag_sd";
-    LogWasFitted: Note Warning =>;
-    LogWasHeldout: Note Warning =>;
+    LogWasFitted: Note =>;
+    LogWasHeldout: Note =>;
     LowerBand: Warning => "cutoff" "cutoff_tried";
     MasslessFrame: Note Warning => "largest_moment";
     MimicFromEquality: Note => "multiplier" "offset";

@@ -54,6 +54,10 @@ pub struct JointNoise {
     pub joint: String,
     /// √E[φ/(w_j(1−ρ_j²)) | y], with ar1 what the row filter leaves of it, N·m or N; the root mean square over the training rows where it changes with speed or load.
     pub sigma: f64,
+    /// Root mean square of what the posterior mean leaves of the training rows, as the fit weighs them, N·m or N. Above `sigma` where few rows count as
+    /// independent: the mean is then shrunk by more than the noise asks for. 0 in twins of programs before it was kept.
+    #[serde(default)]
+    pub training_rmse: f64,
     /// AR(1) coefficient; 0 unless `ar1`.
     pub rho: f64,
     /// w_j; n_j-weighted geometric mean 1.

@@ -464,13 +464,14 @@ fn an_error_of_the_visitor_ends_the_visit() {
 fn spread_pieces_are_all_of_a_short_log_and_evenly_spread_over_a_long_one() {
     let pipeline = pipeline(20.0);
     let rows = |slices: &[Slice]| -> usize { slices.iter().map(|slice| slice.rows.len()).sum() };
+    const ALL_RAW: usize = 4 * SPREAD_RAW;
     for samples in [1_000, ALL_RAW] {
-        let all = spread_raw(&pipeline, &trajectory(samples, 1e-3), f64::NEG_INFINITY);
+        let all = spread_raw(&pipeline, &trajectory(samples, 1e-3), f64::NEG_INFINITY, 8);
         assert_eq!(rows(&all), samples);
     }
     for samples in [ALL_RAW + 1, 3 * ALL_RAW / 2, 10 * ALL_RAW + 77] {
         let long = trajectory(samples, 1e-3);
-        let some = spread_raw(&pipeline, &long, f64::NEG_INFINITY);
+        let some = spread_raw(&pipeline, &long, f64::NEG_INFINITY, 1);
         assert!(
             rows(&some).abs_diff(SPREAD_RAW) <= 2 * RAW_PIECE,
             "{samples}"
@@ -484,5 +485,12 @@ fn spread_pieces_are_all_of_a_short_log_and_evenly_spread_over_a_long_one() {
             w[1] > w[0] && (gap - apart).abs() <= 1.01 * RAW_PIECE as f64
         }));
         assert!(starts[0] == 0 && samples - starts[starts.len() - 1] < 2 * apart as usize);
+    }
+    // Of 500 logs 65 536 rows together, of 5000 logs 64 of each.
+    for (logs, each) in [(500, SPREAD_RAW_TOGETHER / 500), (5000, LEAST_RAW)] {
+        let log = trajectory(1_000, 1e-3);
+        let some = spread_raw(&pipeline, &log, f64::NEG_INFINITY, logs);
+        assert!(rows(&some).abs_diff(each) <= 2 * each / 4, "{logs}");
+        assert!(some.len() >= 4 && some[some.len() - 1].rows.start >= 600);
     }
 }

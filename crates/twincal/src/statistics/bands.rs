@@ -35,10 +35,11 @@ impl Bands {
     /// Number of bands.
     pub(crate) const COUNT: usize = 26;
 
-    /// Of the moving rows of a joint, as the fit weighs them.
-    pub(super) fn of(part: &Part<'_>, joint: usize) -> Self {
-        let (all, rows) = (part.observations, &part.observations.joints[joint]);
-        let signals = rows.signals();
+    /// Of the moving rows of a joint in some parts, as the fit weighs them.
+    pub(super) fn of(parts: &[&Part<'_>], joint: usize) -> Self {
+        let signals = parts
+            .first()
+            .map_or(0, |part| part.observations.joints[joint].signals());
         let mut bands = Self {
             power: vec![Symmetric::zeros(signals + 1); edges().len() - 1],
             longest: 0,
@@ -47,13 +48,26 @@ impl Bands {
             values: vec![Vec::new(); signals + 1],
             planner: RealFftPlanner::new(),
         };
+        for part in parts {
+            bands.add_rows(part, joint, &mut run);
+        }
+        for sums in &mut bands.power {
+            mirror(&mut sums.values, sums.size);
+        }
+        bands
+    }
+
+    /// Adds to lower triangles.
+    fn add_rows(&mut self, part: &Part<'_>, joint: usize, run: &mut Run) {
+        let (all, rows) = (part.observations, &part.observations.joints[joint]);
+        let signals = rows.signals();
         for range in part.runs_between_starts() {
             rows.visit_signals(all.len(), range, &mut |range, columns| {
                 let moving = |row: &usize| !rows.standstill[*row];
                 let mut from = range.start;
                 while from < range.end {
                     if !moving(&from) {
-                        bands.end(&mut run);
+                        self.end(run);
                         from += 1;
                         continue;
                     }
@@ -65,17 +79,13 @@ impl Bands {
                     run.values[signals].extend_from_slice(&rows.y[from..to]);
                     run.weigh(&rows.weight, from..to);
                     if run.len() == LONGEST {
-                        bands.end(&mut run);
+                        self.end(run);
                     }
                     from = to;
                 }
             });
-            bands.end(&mut run);
+            self.end(run);
         }
-        for sums in &mut bands.power {
-            mirror(&mut sums.values, sums.size);
-        }
-        bands
     }
 
     /// Of some of the signals.

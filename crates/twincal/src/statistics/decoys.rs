@@ -31,13 +31,20 @@ pub(crate) struct JointDecoys {
 }
 
 impl JointDecoys {
-    /// Sums over the rows of a part as the fit weighs them, over signals.
-    pub(crate) fn of(part: &Part<'_>, joint: usize) -> Self {
+    /// Adds the rows of a part as the fit weighs them, over signals.
+    ///
+    /// # Panics
+    /// If the joint has other signals there.
+    pub(super) fn add_rows(&mut self, part: &Part<'_>, joint: usize) {
         let (all, rows) = (part.observations, &part.observations.joints[joint]);
         let signals = rows.signals();
         let width = signals + 1;
-        let mut sums = vec![0.0; DECOYS * width];
-        let mut square = vec![0.0; DECOYS];
+        if self.square.is_empty() {
+            self.columns = signals;
+            self.cross = vec![0.0; DECOYS * width];
+            self.square = vec![0.0; DECOYS];
+        }
+        assert_eq!(self.columns, signals, "the same signals in all parts");
         rows.visit_signals(all.len(), part.rows.clone(), &mut |range, columns| {
             let motion = [&all.q[joint], &all.qd[joint]];
             let [q, qd] = motion.map(|values| values.some(range.clone()));
@@ -58,7 +65,7 @@ impl JointDecoys {
                     }
                 }
                 let own = phi.chunks_exact(count).zip(weighted.chunks_exact(count));
-                for (square, (phi, weighted)) in square.iter_mut().zip(own) {
+                for (square, (phi, weighted)) in self.square.iter_mut().zip(own) {
                     *square += dot(phi, weighted);
                 }
                 let mut x: Vec<f64> = (0..signals)
@@ -67,14 +74,9 @@ impl JointDecoys {
                     .collect();
                 x.extend_from_slice(&rows.y[range.start + from..][..count]);
                 let products = product_transposed(&weighted, &x, [DECOYS, count, width]);
-                (sums.iter_mut().zip(products)).for_each(|(sum, product)| *sum += product);
+                (self.cross.iter_mut().zip(products)).for_each(|(sum, product)| *sum += product);
             }
         });
-        Self {
-            columns: signals,
-            cross: sums,
-            square,
-        }
     }
 
     /// Sums over rows of decoys that somebody else has made; φ, X and y are row after row of one column after the other.

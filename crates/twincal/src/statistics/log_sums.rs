@@ -1,4 +1,4 @@
-//! What is kept of one log: sums over ten stretches of its rows, of the signals that columns are made of.
+//! What is kept of a log, or of logs that are left out together: sums over ten stretches of their rows, of the signals that columns are made of.
 
 use super::bands::Bands;
 use super::decoys::JointDecoys;
@@ -23,7 +23,7 @@ pub(crate) enum Runs {
     Joined,
 }
 
-/// Sums over the rows of one log, or of a part of it.
+/// Sums over the rows of one log, of a part of it, or of several.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct LogSums {
     /// Of the filter that made the rows, cycles per row; 0 without a filter.
@@ -63,18 +63,24 @@ pub(crate) fn stretch(rows: &Range<usize>, block: usize) -> Range<usize> {
 }
 
 impl LogSums {
-    /// Sums over the rows of a part, as the fit weighs them. Runs of rows go on from one stretch to the next, so that all stretches together have
-    /// the sums of the uncut part. Of fewer than ten `stretches` each stands in the place of its first tenth.
-    pub(crate) fn of(part: &Part<'_>, stretches: usize) -> Self {
-        let joints = 0..part.observations.joints.len();
+    /// Sums over the rows of some parts, each of another log, as the fit weighs them; columns follow alike in all of them. With [`Runs::Joined`] runs of
+    /// rows go on from one stretch to the next, so that all stretches together have the sums of the uncut part. Of fewer than ten `stretches` each stands
+    /// in the place of its first tenth.
+    pub(crate) fn of(parts: &[&Part<'_>], stretches: usize, runs: Runs) -> Self {
+        let joints = parts
+            .first()
+            .map_or(0, |part| part.observations.joints.len());
+        let rows = |block| {
+            parts
+                .iter()
+                .map(move |part| stretch(&part.rows, block).len())
+        };
         Self {
-            cutoff: part.observations.cutoff,
-            rows: (0..BLOCKS)
-                .map(|block| stretch(&part.rows, block).len())
-                .collect(),
-            joints: joints
+            cutoff: (parts.iter().map(|part| part.observations.cutoff)).fold(0.0, f64::max),
+            rows: (0..BLOCKS).map(|block| rows(block).sum()).collect(),
+            joints: (0..joints)
                 .into_par_iter()
-                .map(|joint| JointSums::of(part, joint, stretches))
+                .map(|joint| JointSums::of(parts, joint, stretches, runs))
                 .collect(),
         }
     }
@@ -146,10 +152,12 @@ impl JointSums {
         }
     }
 
-    fn of(part: &Part<'_>, joint: usize, stretches: usize) -> Self {
-        let rows = &part.observations.joints[joint];
-        let (blocks, bands) =
-            rayon::join(|| blocks(part, joint, stretches), || Bands::of(part, joint));
+    fn of(parts: &[&Part<'_>], joint: usize, stretches: usize, runs: Runs) -> Self {
+        let rows = &parts[0].observations.joints[joint];
+        let (blocks, bands) = rayon::join(
+            || blocks(parts, joint, stretches, runs),
+            || Bands::of(parts, joint),
+        );
         Self {
             columns: rows.columns.clone(),
             recipes: rows.recipes.clone(),
@@ -159,35 +167,64 @@ impl JointSums {
     }
 }
 
-fn blocks(part: &Part<'_>, joint: usize, stretches: usize) -> Vec<JointBlock> {
-    let signals = part.observations.joints[joint].signals() as u32;
-    let mut run = OpenRun::default();
+fn blocks(parts: &[&Part<'_>], joint: usize, stretches: usize, runs: Runs) -> Vec<JointBlock> {
+    let mut open = vec![OpenRun::default(); parts.len()];
     let mut blocks = vec![JointBlock::default(); BLOCKS];
     let tenths = BLOCKS / stretches;
-    for block in (0..BLOCKS).step_by(tenths) {
-        let (first, last) = (block, block + tenths - 1);
-        let own = Part {
+    for first in (0..BLOCKS).step_by(tenths) {
+        let last = first + tenths - 1;
+        let own = parts.iter().map(|part| Part {
             observations: part.observations,
             rows: stretch(&part.rows, first).start..stretch(&part.rows, last).end,
+        });
+        let own: Vec<Part<'_>> = own.collect();
+        let block = &mut blocks[first];
+        block.gram = match runs {
+            Runs::Apart => gram(&own, joint),
+            Runs::Joined => joined(&own, joint, &mut open, [first == 0, last + 1 == BLOCKS]),
         };
-        let mut sums = JointAccumulator::resume((0..signals).collect(), std::mem::take(&mut run));
-        own.add_joint_on(joint, block == 0, &mut sums);
-        let gram = if last + 1 == BLOCKS {
-            sums.finish()
-        } else {
-            let (gram, open) = sums.cut();
-            run = open;
-            gram
-        };
-        let mut own_sums = JointBlock {
-            gram,
-            decoys: JointDecoys::of(&own, joint),
-            ..JointBlock::default()
-        };
-        own_sums.add_torque(&own, joint);
-        blocks[block] = own_sums;
+        for part in &own {
+            block.decoys.add_rows(part, joint);
+            block.add_torque(part, joint);
+        }
     }
     blocks
+}
+
+fn signals(part: &Part<'_>, joint: usize) -> Vec<u32> {
+    let signals = part.observations.joints[joint].signals() as u32;
+    (0..signals).collect()
+}
+
+/// Over the signals of a joint, all rows together.
+fn gram(parts: &[Part<'_>], joint: usize) -> JointGram {
+    let mut sums = JointAccumulator::new(signals(&parts[0], joint));
+    for part in parts {
+        part.add_joint_on(joint, true, &mut sums);
+    }
+    sums.finish()
+}
+
+/// The same where runs go on from the stretch before, and are `open` for the next; whether it is the first and the last one.
+fn joined(
+    parts: &[Part<'_>],
+    joint: usize,
+    open: &mut [OpenRun],
+    [first, last]: [bool; 2],
+) -> JointGram {
+    let mut gram = JointGram::default();
+    for (part, open) in parts.iter().zip(open) {
+        let mut sums = JointAccumulator::resume(signals(part, joint), std::mem::take(open));
+        part.add_joint_on(joint, first, &mut sums);
+        if last {
+            gram += &sums.finish();
+        } else {
+            let (own, run) = sums.cut();
+            gram += &own;
+            *open = run;
+        }
+    }
+    gram
 }
 
 impl JointBlock {

@@ -12,6 +12,7 @@ use super::unit::residual_form;
 use crate::diagnostics::initial_positive_sequence;
 use crate::term::Recipes;
 use std::f64::consts::TAU;
+use std::ops::AddAssign;
 use std::sync::Arc;
 
 /// Of one joint over all logs.
@@ -30,15 +31,18 @@ struct Kind {
 }
 
 impl Spectrum {
-    /// Adds the rows of one log.
+    /// Adds the rows of one log, or of several.
     pub(super) fn add(&mut self, log: &JointSums) {
-        let known = self.sums.iter_mut().find(|own| own.recipes == log.recipes);
-        match known {
-            Some(known) => known.bands += &log.bands,
+        self.add_kind(&log.recipes, &log.columns, &log.bands);
+    }
+
+    fn add_kind(&mut self, recipes: &Option<Arc<Recipes>>, columns: &[usize], bands: &Bands) {
+        match self.sums.iter_mut().find(|own| own.recipes == *recipes) {
+            Some(known) => known.bands += bands,
             None => self.sums.push(Kind {
-                columns: log.columns.clone(),
-                recipes: log.recipes.clone(),
-                bands: log.bands.clone(),
+                columns: columns.to_vec(),
+                recipes: recipes.clone(),
+                bands: bands.clone(),
             }),
         }
     }
@@ -83,6 +87,16 @@ impl Spectrum {
         };
         let longest = self.sums.iter().map(|own| own.bands.longest);
         initial_positive_sequence(longest.max().unwrap_or(0), correlation).max(1.0)
+    }
+}
+
+impl AddAssign<&Spectrum> for Spectrum {
+    /// # Panics
+    /// If the two belong to different signals.
+    fn add_assign(&mut self, other: &Spectrum) {
+        for own in &other.sums {
+            self.add_kind(&own.recipes, &own.columns, &own.bands);
+        }
     }
 }
 

@@ -7,7 +7,7 @@ use crate::gram::Gram;
 use crate::observations::Part;
 use crate::term::Recipes;
 use rayon::prelude::*;
-use std::ops::Range;
+use std::ops::{AddAssign, Range};
 use std::sync::Arc;
 
 /// Groups of logs at most, each with its stretches: seven for each of six units.
@@ -16,7 +16,7 @@ pub(crate) const GROUPS: usize = 42;
 const UNITS: usize = 6;
 /// Logs up to which tenths of each are kept; of more fifths.
 const FEW_LOGS: usize = 4;
-/// Logs that are added up at a time.
+/// Groups of logs that are added up at a time.
 const BATCH: usize = 4;
 
 /// Sums over the rows of some logs. Logs come in the order of their names; of more than 42, every 42nd is in one group.
@@ -87,6 +87,45 @@ struct JointCell {
     sums: Vec<(Option<Arc<Recipes>>, JointBlock)>,
 }
 
+impl JointCell {
+    fn add(&mut self, columns: &[usize], recipes: &Option<Arc<Recipes>>, block: &JointBlock) {
+        columns.clone_into(&mut self.columns);
+        match self.sums.iter_mut().find(|(own, _)| own == recipes) {
+            Some((_, sum)) => *sum += block,
+            None => self.sums.push((recipes.clone(), block.clone())),
+        }
+    }
+}
+
+impl AddAssign<&Sums> for Sums {
+    /// Group by group: groups of the same number are left out together.
+    ///
+    /// # Panics
+    /// If the two belong to different robots or libraries.
+    fn add_assign(&mut self, other: &Sums) {
+        self.keep = other.keep;
+        self.logs += other.logs;
+        self.cutoff = self.cutoff.max(other.cutoff);
+        let joints = self.spectra.len().max(other.spectra.len());
+        self.spectra.resize_with(joints, Spectrum::default);
+        for (spectrum, own) in self.spectra.iter_mut().zip(&other.spectra) {
+            *spectrum += own;
+        }
+        for (group, cells) in other.cells.iter().enumerate() {
+            for (sum, own) in self.group(group).iter_mut().zip(cells) {
+                sum.rows += own.rows;
+                let joints = sum.joints.len().max(own.joints.len());
+                sum.joints.resize_with(joints, JointCell::default);
+                for (sum, own) in sum.joints.iter_mut().zip(&own.joints) {
+                    for (recipes, block) in &own.sums {
+                        sum.add(&own.columns, recipes, block);
+                    }
+                }
+            }
+        }
+    }
+}
+
 impl Sums {
     /// Without rows yet, for so many logs.
     pub(crate) fn empty(runs: Runs, logs: (usize, Purpose)) -> Self {
@@ -98,17 +137,49 @@ impl Sums {
 
     /// Of the rows of these parts, each of another log.
     pub(crate) fn of(parts: &[Part<'_>], runs: Runs, purpose: Purpose) -> Self {
+        Self::of_some(parts, runs, (parts.len(), purpose))
+    }
+
+    /// Of the rows of some of so many logs.
+    fn of_some(parts: &[Part<'_>], runs: Runs, logs: (usize, Purpose)) -> Self {
         let mut parts: Vec<&Part<'_>> = parts.iter().collect();
         parts.sort_by(|a, b| a.observations.log.cmp(&b.observations.log));
-        let mut sums = Self::empty(runs, (parts.len(), purpose));
-        let stretches = sums.keep.stretches;
-        for batch in parts.chunks(BATCH) {
-            let logs: Vec<LogSums> = (batch.par_iter())
-                .map(|part| LogSums::of(part, stretches))
-                .collect();
-            logs.iter().for_each(|log| sums.add(log));
+        let mut sums = Self::empty(runs, logs);
+        let (stretches, groups) = (sums.keep.stretches, sums.keep.groups.min(parts.len()));
+        let numbers: Vec<usize> = (0..groups).collect();
+        for batch in numbers.chunks(BATCH) {
+            let of_group = |group: &usize| -> Vec<LogSums> {
+                let own = alike(parts.iter().copied().skip(*group).step_by(groups));
+                let sums = own.iter().map(|own| LogSums::of(own, stretches, runs));
+                sums.collect()
+            };
+            let logs: Vec<Vec<LogSums>> = batch.par_iter().map(of_group).collect();
+            for (group, logs) in batch.iter().zip(logs) {
+                logs.iter().for_each(|own| sums.add_to(*group, own));
+            }
         }
+        sums.logs = parts.len();
         sums
+    }
+
+    /// Of the rows of each set, as one of sets that are left out in turn ([`Self::without`]): rows are added up once.
+    pub(crate) fn of_sets(sets: &[Vec<Part<'_>>], runs: Runs, purpose: Purpose) -> Vec<Self> {
+        let logs = sets.iter().map(Vec::len).sum();
+        let sums = sets.par_iter();
+        let sums = sums.map(|set| Self::of_some(set, runs, (logs, purpose)));
+        sums.collect()
+    }
+
+    /// All of `sets` but one.
+    ///
+    /// # Panics
+    /// If they belong to different robots or libraries.
+    pub(crate) fn without(sets: &[Self], left_out: usize) -> Self {
+        let mut rest = Self::default();
+        let others = sets.iter().enumerate();
+        let others = others.filter(|(set, _)| *set != left_out);
+        others.for_each(|(_, own)| rest += own);
+        rest
     }
 
     /// Adds the log whose name is next.
@@ -116,39 +187,42 @@ impl Sums {
     /// # Panics
     /// If it belongs to another robot or library than those before.
     pub(crate) fn add(&mut self, log: &LogSums) {
-        let group = self.logs % self.keep.groups;
-        let merged = BLOCKS / self.keep.stretches;
+        self.add_to(self.logs % self.keep.groups, log);
         self.logs += 1;
+    }
+
+    /// Adds logs of a group.
+    fn add_to(&mut self, group: usize, log: &LogSums) {
+        let merged = BLOCKS / self.keep.stretches;
         self.cutoff = self.cutoff.max(log.cutoff);
-        if self.cells.len() == group {
-            self.cells.push(vec![Cell::default(); BLOCKS]);
-        }
         self.spectra
             .resize_with(log.joints.len(), Spectrum::default);
         for (spectrum, joint) in self.spectra.iter_mut().zip(&log.joints) {
             spectrum.add(joint);
         }
+        let runs = self.keep.runs;
+        let cells = self.group(group);
         for block in 0..BLOCKS {
-            let cell = &mut self.cells[group][block / merged * merged];
+            let cell = &mut cells[block / merged * merged];
             cell.rows += log.rows[block];
             cell.joints
                 .resize_with(log.joints.len(), JointCell::default);
             for (sum, joint) in cell.joints.iter_mut().zip(&log.joints) {
                 let mut own = joint.blocks[block].clone();
-                if self.keep.runs == Runs::Apart {
+                if runs == Runs::Apart {
                     own.gram.forget_runs();
                 }
-                sum.columns.clone_from(&joint.columns);
-                match sum
-                    .sums
-                    .iter_mut()
-                    .find(|(recipes, _)| *recipes == joint.recipes)
-                {
-                    Some((_, sum)) => *sum += &own,
-                    None => sum.sums.push((joint.recipes.clone(), own)),
-                }
+                sum.add(&joint.columns, &joint.recipes, &own);
             }
         }
+    }
+
+    /// Cells of a group.
+    fn group(&mut self, group: usize) -> &mut [Cell] {
+        let groups = self.cells.len().max(group + 1);
+        self.cells
+            .resize_with(groups, || vec![Cell::default(); BLOCKS]);
+        &mut self.cells[group]
     }
 
     /// Stretches of each log that can be told apart: 10, 5 or 1 of about equal length.
@@ -223,4 +297,20 @@ impl Sums {
         let all: Vec<_> = (0..self.groups()).map(|group| (group, 0..BLOCKS)).collect();
         self.unit(&all)
     }
+}
+
+/// Logs whose columns follow alike from signals together, joint by joint: where a payload acts in some logs only, there are two such sets.
+fn alike<'a, 'b>(logs: impl Iterator<Item = &'b Part<'a>>) -> Vec<Vec<&'b Part<'a>>> {
+    let same = |a: &Part<'_>, b: &Part<'_>| {
+        let pairs = a.observations.joints.iter().zip(&b.observations.joints);
+        pairs.into_iter().all(|(a, b)| a.recipes == b.recipes)
+    };
+    let mut sets: Vec<Vec<&'b Part<'a>>> = Vec::new();
+    for log in logs {
+        match sets.iter_mut().find(|set| same(set[0], log)) {
+            Some(set) => set.push(log),
+            None => sets.push(vec![log]),
+        }
+    }
+    sets
 }

@@ -146,3 +146,71 @@ fn left_out_squares_are_those_of_rows() {
         .sum();
     assert!((own / truth - 1.0).abs() < 1e-12, "{own} {truth}");
 }
+
+/// Both are sums over the same rows.
+fn alike(own: &Sums, other: &Sums) {
+    assert_eq!(own.rows(), other.rows());
+    let (ours, theirs) = (own.total(), other.total());
+    let [ours, theirs] = [&ours, &theirs].map(|of| (&of.gram.joints[0], &of.joints[0]));
+    assert_eq!(ours.0.n, theirs.0.n);
+    near(&ours.0.s0, &theirs.0.s0);
+    near(&ours.0.d, &theirs.0.d);
+    assert!((ours.1.torque / theirs.1.torque - 1.0).abs() < 1e-12);
+    assert_eq!(ours.1.decoys.count(), theirs.1.decoys.count());
+    for decoy in 0..ours.1.decoys.count() {
+        let [ours, theirs] = [ours, theirs].map(|of| of.1.decoys.square(decoy));
+        assert!((ours / theirs - 1.0).abs() < 1e-12, "{ours} {theirs}");
+    }
+    let time =
+        |of: &Sums| of.spectra[0].autocorrelation_time(&[0.0, 0.0, 0.0, 0.0, 0.3, 0.0, 0.0, -1.2]);
+    let (ours, theirs) = (time(own), time(other));
+    assert!(
+        (ours - theirs).abs() < 1e-9 * (1.0 + theirs),
+        "{ours} {theirs}"
+    );
+}
+
+/// Logs of a group that are added up together are those that are added one by one.
+#[test]
+fn logs_together_are_those_one_by_one() {
+    let logs: Vec<Observations> = (0..90)
+        .map(|seed| log(seed, &format!("{seed:02}")))
+        .collect();
+    let parts: Vec<Part<'_>> = logs.iter().map(Observations::whole).collect();
+    for runs in [Runs::Apart, Runs::Joined] {
+        let together = Sums::of(&parts, runs, Purpose::Result);
+        let mut one_by_one = Sums::empty(runs, (parts.len(), Purpose::Result));
+        let stretches = one_by_one.stretches();
+        for part in &parts {
+            one_by_one.add(&LogSums::of(&[part], stretches, runs));
+        }
+        assert_eq!(together.groups(), one_by_one.groups());
+        for group in 0..together.groups() {
+            let [ours, theirs] =
+                [&together, &one_by_one].map(|of| of.unit(&[(group, 0..BLOCKS)]).gram);
+            near(&ours.joints[0].s0, &theirs.joints[0].s0);
+        }
+        alike(&together, &one_by_one);
+    }
+}
+
+/// All sets but one are their logs.
+#[test]
+fn a_set_that_is_left_out_leaves_the_logs_of_the_others() {
+    let logs: Vec<Observations> = (0..23)
+        .map(|seed| log(seed, &format!("{seed:02}")))
+        .collect();
+    let set = |out: usize| logs.iter().skip(out).step_by(5).map(Observations::whole);
+    let sets: Vec<Vec<Part<'_>>> = (0..5).map(|out| set(out).collect()).collect();
+    for runs in [Runs::Apart, Runs::Joined] {
+        let sums = Sums::of_sets(&sets, runs, Purpose::Fit);
+        for out in 0..sets.len() {
+            let others = (0..sets.len()).filter(|of| *of != out);
+            let others: Vec<Part<'_>> = others.flat_map(set).collect();
+            alike(
+                &Sums::without(&sums, out),
+                &Sums::of(&others, runs, Purpose::Fit),
+            );
+        }
+    }
+}

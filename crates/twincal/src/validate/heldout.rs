@@ -3,12 +3,12 @@
 use super::conformal::stretch;
 use super::memory::ErrorMemory;
 use super::{
-    ConformalKeeper, Moments, PitKeeper, Reliability, RivalKeeper, ScoreKeeper, Scores, Split,
-    Trace, TraceRows, Validation,
+    ConformalKeeper, PitKeeper, Reliability, RivalKeeper, ScoreKeeper, Scores, Split, Trace,
+    TraceRows, Validation,
 };
 use crate::error::{Finding, Result};
 use crate::incidents::{Evidence, incident_findings, leave_out};
-use crate::observations::{Observations, Part};
+use crate::observations::Observations;
 use crate::robot::Robot;
 use crate::rows::{RowBlock, RowSignal, slices, spread_raw, visit_slices};
 use crate::signal::{FewChapters, Log, Pipeline, Recording, Trajectory, median_step};
@@ -37,7 +37,6 @@ pub struct HeldOut {
     conformal: ConformalKeeper,
     rivals: RivalKeeper,
     /// Per joint; empty where rows are not kept.
-    moments: Vec<Moments>,
     traces: Vec<Trace>,
 }
 
@@ -113,7 +112,6 @@ impl HeldOut {
             raw_moving: keeper,
             conformal: ConformalKeeper::default(),
             rivals: RivalKeeper::default(),
-            moments: Vec::new(),
             traces: Vec::new(),
         }
     }
@@ -171,7 +169,7 @@ impl HeldOut {
             pipeline,
             predictor,
             &trajectory,
-            f64::NEG_INFINITY,
+            (f64::NEG_INFINITY, 1),
         )
     }
 
@@ -217,18 +215,9 @@ impl HeldOut {
             self.push_filtered(block, predictors, &mut collected);
         });
         self.add(collected);
-        let begin = observations.time.partition_point(|t| *t < from);
-        let rows = begin..observations.len();
-        self.moments.resize(self.names.len(), Moments::default());
-        let beyond = observations.beyond_nominal();
-        let observations = beyond.as_ref().unwrap_or(observations);
-        let gram = Part { observations, rows }.gram();
-        for (moments, gram) in self.moments.iter_mut().zip(&gram.joints) {
-            *moments += Moments::of(gram);
-        }
     }
 
-    /// The raw rows of [`HeldOut::score`] alone, of the log whose filtered rows were scored last.
+    /// The raw rows of [`HeldOut::score`] alone, of the log whose filtered rows were scored last: one of so many logs, at or after a time, s.
     ///
     /// # Errors
     /// Those of [`visit_slices`].
@@ -239,12 +228,12 @@ impl HeldOut {
         pipeline: &Pipeline,
         twin: &Predictor,
         trajectory: &Trajectory,
-        from: f64,
+        (from, logs): (f64, usize),
     ) -> Result<()> {
         if pipeline.cutoff_hz > 0.0 {
             self.add_logged(trajectory);
         }
-        let keepers: Vec<[ScoreKeeper; 2]> = spread_raw(pipeline, trajectory, from)
+        let keepers: Vec<[ScoreKeeper; 2]> = spread_raw(pipeline, trajectory, from, logs)
             .into_par_iter()
             .map(|slice| {
                 let mut all = ScoreKeeper::new(self.names.clone());
@@ -391,7 +380,7 @@ impl HeldOut {
             pit: pooled.pit(),
             reliability: self.names.iter().zip(&self.pit).map(reliability).collect(),
             compact: self.rivals.losses(),
-            moments: self.moments,
+            moments: Vec::new(),
             traces: self.traces,
         }
     }
@@ -437,11 +426,6 @@ impl AddAssign for HeldOut {
         }
         self.conformal.join(other.conformal);
         self.rivals += other.rivals;
-        let joints = self.moments.len().max(other.moments.len());
-        self.moments.resize(joints, Moments::default());
-        for (own, more) in self.moments.iter_mut().zip(other.moments) {
-            *own += more;
-        }
         self.traces.extend(other.traces);
     }
 }

@@ -260,6 +260,7 @@ fn joint_noise(robot: &Robot) -> Vec<JointNoise> {
         .map(|(j, name)| JointNoise {
             joint: (*name).to_owned(),
             sigma: 0.3 + 0.2 * j as f64,
+            training_rmse: 0.0,
             rho: 0.0,
             weight: 1.0,
             n: 900.0,

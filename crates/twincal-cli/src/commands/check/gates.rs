@@ -78,7 +78,7 @@ impl<'a> Own<'a> {
             true => (noise.n / rows as f64).max(1.0).sqrt(),
             false => 1.0,
         };
-        match all * noise.sigma {
+        match all * noise.sigma.max(noise.training_rmse) {
             own if own > held_out => (own, "of the twin on the rows of its fit"),
             _ => (held_out, own_rows(&self.scores.split)),
         }
@@ -230,9 +230,14 @@ pub(super) mod tests {
 
     /// With a twin whose noise has an sd of 0.05 on 90 rows.
     fn judged(scores: &Validation, own: &Validation, gates: Gates, fitted: bool) -> Vec<Gate> {
-        let noise = JointNoise {
+        judged_by(&noise(), scores, own, gates, fitted)
+    }
+
+    fn noise() -> JointNoise {
+        JointNoise {
             joint: "elbow".into(),
             sigma: 0.05,
+            training_rmse: 0.04,
             rho: 0.0,
             weight: 1.0,
             n: 90.0,
@@ -242,10 +247,19 @@ pub(super) mod tests {
             interval_factor: 1.0,
             out_of_band: 0.0,
             spread: twincal::likelihood::Spread::default(),
-        };
+        }
+    }
+
+    fn judged_by(
+        noise: &JointNoise,
+        scores: &Validation,
+        own: &Validation,
+        gates: Gates,
+        fitted: bool,
+    ) -> Vec<Gate> {
         let own = Own {
             scores: own,
-            noise: &[noise],
+            noise: std::slice::from_ref(noise),
             gates,
             fitted,
         };
@@ -262,6 +276,23 @@ pub(super) mod tests {
         let values: Vec<f64> = judged.iter().map(|gate| gate.value).collect();
         assert_eq!(values, [9.0, 0.1]);
         assert!(judged[1].words.contains("10.0\u{202f}% of the rows"));
+    }
+
+    #[test]
+    fn the_error_of_few_independent_rows_is_that_of_the_posterior_mean() {
+        let mut noise = noise();
+        for (sigma, rmse, limit) in [(0.05, 0.2, 0.24), (0.2, 0.05, 0.24), (0.05, 0.05, 0.12)] {
+            (noise.sigma, noise.training_rmse) = (sigma, rmse);
+            let gates = judged_by(
+                &noise,
+                &scores(0.1, 0.95),
+                &scores(0.1, 0.95),
+                Gates::default(),
+                false,
+            );
+            let at = gates[0].limit[1].unwrap();
+            assert!((at - limit).abs() < 1e-12, "{at} instead of {limit}");
+        }
     }
 
     #[test]

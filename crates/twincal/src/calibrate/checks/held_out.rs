@@ -5,21 +5,21 @@ use super::independent_rows::LEAST_EFFECTIVE_ROWS;
 use crate::calibrate::data::all_logs::{Data, Trajectories};
 use crate::calibrate::data::log::Log;
 use crate::calibrate::fit::compact;
-use crate::calibrate::fit::fitted::{Fitted, estimate, sums};
+use crate::calibrate::fit::fitted::{Fitted, estimate, runs, sums};
 use crate::calibrate::fit::friction_only;
 use crate::calibrate::fit::noise_of::noise_of;
 use crate::calibrate::progress::{Stage, Watch};
 use crate::calibrate::settings::CalibrationSettings;
 use crate::error::{Code, Finding, Result, Severity};
 use crate::likelihood::{Columns, JointNoise};
-use crate::observations::{Observations, Part};
+use crate::observations::{GramSum, Observations, Part};
 use crate::plug_in::Fit;
 use crate::posterior::Posterior;
 use crate::signal::{Pipeline, Trajectory};
-use crate::statistics::Purpose;
+use crate::statistics::{Purpose, Sums};
 use crate::term::Library;
 use crate::twin::Twin;
-use crate::validate::{HeldOut, LOG_GROUPS, Predictors, Split, Validation};
+use crate::validate::{HeldOut, LOG_GROUPS, Moments, Predictors, Split, Validation};
 use rayon::prelude::*;
 
 /// Share of a log that trains when there are one or two logs.
@@ -50,6 +50,23 @@ struct LeftOut<'a> {
     from: f64,
 }
 
+impl<'a> Fold<'a> {
+    /// The logs that are held out, whole.
+    fn left_out(&self) -> Vec<Part<'a>> {
+        self.held_out.iter().map(|own| own.rows.whole()).collect()
+    }
+}
+
+impl LeftOut<'_> {
+    /// Adds its rows, with measured less nominal torque.
+    fn add_to(&self, sum: &mut GramSum) {
+        let rows = self.rows.time.partition_point(|t| *t < self.from)..self.rows.len();
+        let beyond = self.rows.beyond_nominal();
+        let observations = beyond.as_ref().unwrap_or(self.rows);
+        sum.add(&Part { observations, rows });
+    }
+}
+
 /// The twin that was fitted to all logs, the posterior of its compact form, and the fit that they come from.
 #[derive(Clone, Copy)]
 pub(in crate::calibrate) struct Own<'a> {
@@ -66,6 +83,17 @@ struct Rivals {
     friction: Option<Posterior>,
 }
 
+impl Own<'_> {
+    /// The twin as it is: it has seen nothing of whole logs that are held out.
+    fn rivals(&self, library: &Library) -> Rivals {
+        Rivals {
+            average: self.twin.clone(),
+            compact: self.compact.clone(),
+            friction: friction_only::fitted(library, self.fit),
+        }
+    }
+}
+
 impl Plan<'_> {
     /// The fits that do not know what is held out, plug-ins, misfit and all, fold by fold; none where whole logs are
     /// held out, which the twin itself predicts.
@@ -74,16 +102,22 @@ impl Plan<'_> {
         columns: &Columns,
         settings: &CalibrationSettings,
     ) -> Result<Vec<Fitted>> {
+        let fitted =
+            |fold: &Fold<'_>, sums: &Sums| estimate(sums, &fold.training, columns, settings);
+        let folds = self.folds.par_iter();
         match self.split {
             Split::HeldoutLogs | Split::NotTested => Ok(Vec::new()),
-            Split::LeaveOneLogOut | Split::LeaveLogGroupsOut | Split::LastThirty => self
-                .folds
-                .par_iter()
-                .map(|fold| {
-                    let sums = sums(&fold.training, settings, Purpose::Fit);
-                    estimate(&sums, &fold.training, columns, settings)
-                })
+            Split::LeaveOneLogOut | Split::LastThirty => folds
+                .map(|fold| fitted(fold, &sums(&fold.training, settings, Purpose::Fit)))
                 .collect(),
+            Split::LeaveLogGroupsOut => {
+                let sets: Vec<Vec<Part<'_>>> = self.folds.iter().map(Fold::left_out).collect();
+                let sets = Sums::of_sets(&sets, runs(settings), Purpose::Fit);
+                let folds = folds.enumerate();
+                folds
+                    .map(|(out, fold)| fitted(fold, &Sums::without(&sets, out)))
+                    .collect()
+            }
         }
     }
 }
@@ -100,21 +134,16 @@ pub(in crate::calibrate) fn validate(
     let twin = own.twin;
     let mut findings = Vec::new();
     let mut held_out = HeldOut::new(twin.robot.joint_names());
+    let mut rows = GramSum::default();
     let mut fits = fits.into_iter();
+    let logs = plan.folds.iter().map(|fold| fold.held_out.len()).sum();
     for (done, fold) in plan.folds.iter().enumerate() {
         progress(Stage::Validation(done, plan.folds.len()))?;
-        let Rivals {
-            average,
-            compact,
-            friction,
-        } = match fits.next() {
-            None => Rivals {
-                average: twin.clone(),
-                compact: own.compact.clone(),
-                friction: friction_only::fitted(library, own.fit),
-            },
+        let rivals = match fits.next() {
+            None => own.rivals(library),
             Some(fitted) => refitted(twin, library, fitted)?,
         };
+        let average = rivals.average;
         if !fold.training.is_empty() && !says_something(&average.noise) {
             findings.push(not_scored(&fold.held_out, &average.noise));
             continue;
@@ -127,15 +156,15 @@ pub(in crate::calibrate) fn validate(
             };
             twin.predictor(library)
         };
-        let compact = rival(compact)?;
-        let friction = friction.map(rival).transpose()?;
+        let compact = rival(rivals.compact)?;
+        let friction = rivals.friction.map(rival).transpose()?;
         let predictors = Predictors {
             twin: &predictor,
             compact: Some(&compact),
             friction: friction.as_ref(),
         };
         for left_out in &fold.held_out {
-            let own = scored((twin, library), predictors, *left_out)?;
+            let own = scored((twin, library), predictors, (*left_out, logs))?;
             if plan.split == Split::HeldoutLogs {
                 let memory: Vec<f64> = average.noise.iter().map(JointNoise::memory).collect();
                 findings.extend(another_state::finding(
@@ -145,16 +174,21 @@ pub(in crate::calibrate) fn validate(
                 ));
             }
             held_out += own;
+            left_out.add_to(&mut rows);
         }
     }
-    Ok((held_out.finish(plan.split), findings))
+    let validation = Validation {
+        moments: rows.finish().joints.iter().map(Moments::of).collect(),
+        ..held_out.finish(plan.split)
+    };
+    Ok((validation, findings))
 }
 
-/// Scores on what is left out of one log.
+/// Scores on what is left out of one of so many logs.
 fn scored(
     (twin, library): (&Twin, &Library),
     predictors: Predictors<'_>,
-    left_out: LeftOut<'_>,
+    (left_out, logs): (LeftOut<'_>, usize),
 ) -> Result<HeldOut> {
     let LeftOut { rows, motion, from } = left_out;
     let mut own = HeldOut::new(twin.robot.joint_names());
@@ -165,7 +199,7 @@ fn scored(
         &twin.pipeline,
         predictors.twin,
         motion,
-        from,
+        (from, logs),
     )?;
     Ok(own)
 }

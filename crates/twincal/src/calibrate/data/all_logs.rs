@@ -377,7 +377,7 @@ pub(in crate::calibrate) fn spread(
     pipeline: &Pipeline,
     trajectory: &Trajectory,
 ) -> (Vec<Slice>, Vec<[f64; 2]>) {
-    let kept = spread_raw(pipeline, trajectory, f64::NEG_INFINITY);
+    let kept = spread_raw(pipeline, trajectory, f64::NEG_INFINITY, 1);
     let rows: usize = kept.iter().map(|slice| slice.rows.len()).sum();
     if rows == count_rows(pipeline, trajectory, RowSignal::Raw) {
         return (kept, vec![[f64::NEG_INFINITY, f64::INFINITY]]);

@@ -3,6 +3,7 @@
 use super::fitted::Fitted;
 use crate::likelihood::{JointNoise, Spread};
 use crate::robot::Robot;
+use crate::statistics::{of_joint, residual_form};
 
 /// Noise per joint as reported; σ_j = √E[φ/(w_j(1−ρ_j²)) | y].
 pub(in crate::calibrate) fn noise_of(
@@ -17,11 +18,14 @@ pub(in crate::calibrate) fn noise_of(
         .into_iter()
         .enumerate()
         .map(|(j, name)| {
-            let (n, rho) = (fitted.fit.gram.joints[j].n, plug_in.rho[j]);
+            let gram = &fitted.fit.gram.joints[j];
+            let (n, rho) = (gram.n, plug_in.rho[j]);
+            let left_over = residual_form(&gram.s0, &of_joint(gram, &posterior.mean));
             let left = plug_in.variance.get(j).copied().unwrap_or(1.0);
             JointNoise {
                 joint: name.to_owned(),
                 sigma: (left * posterior.noise / (plug_in.weight[j] * (1.0 - rho * rho))).sqrt(),
+                training_rmse: (left_over.max(0.0) / n.max(1.0)).sqrt(),
                 rho,
                 weight: plug_in.weight[j],
                 n,

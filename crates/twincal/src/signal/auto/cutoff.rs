@@ -14,7 +14,7 @@
 
 use crate::signal::clean::correct::DerivedFrom;
 use crate::signal::clean::pieces::Prepared;
-use crate::signal::filter::spectrum::{Noise, Spectrum};
+use crate::signal::filter::spectrum::{Noise, Spectrum, Welch};
 use rayon::prelude::*;
 use std::f64::consts::PI;
 
@@ -88,13 +88,15 @@ pub(crate) fn spectra(prepared: &Prepared<'_>) -> Option<Vec<JointSpectra>> {
     let interval = prepared.interval;
     let dof = pieces.first()?.joints.len();
     let duration = pieces.iter().map(|p| p.time.len()).sum::<usize>() as f64 * interval;
+    let longest = pieces.iter().map(|p| p.time.len()).max()?;
+    let welch = Welch::new(longest, interval)?;
     (0..dof)
         .into_par_iter()
         .map(|joint| {
             let channels = || pieces.iter().map(move |p| &p.joints[joint]);
-            let position = Spectrum::welch(channels().map(|c| &*c.q), interval)?;
-            let qd = Spectrum::welch(channels().filter_map(|c| c.qd.as_deref()), interval);
-            let qdd = Spectrum::welch(channels().filter_map(|c| c.qdd.as_deref()), interval);
+            let position = welch.of(channels().map(|c| &*c.q))?;
+            let qd = welch.of(channels().filter_map(|c| c.qd.as_deref()));
+            let qdd = welch.of(channels().filter_map(|c| c.qdd.as_deref()));
             Some(JointSpectra {
                 position_noise: position.noise(0),
                 velocity_noise: qd.map(|spectrum| spectrum.noise(1)),

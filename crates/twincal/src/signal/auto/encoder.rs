@@ -79,13 +79,12 @@ impl FilteredNoise {
         pipeline: &Pipeline,
     ) -> Self {
         let mut most = Self::default();
+        let mut gains = Gains::default();
         for log in spectra {
-            let kernels =
-                MotionKernels::new(pipeline.motion_cutoff_hz, 1.0 / log.position_noise.rate);
-            let derivatives = [&kernels.smooth, &kernels.first, &kernels.second];
+            let gains = gains.of(log, pipeline);
             // Noise that was differenced n times and is differentiated m times more.
             let after = |noise: Noise, more: i32| {
-                noise.sd() * noise_gain(derivatives[(noise.order + more).clamp(0, 2) as usize])
+                noise.sd() * gains[(noise.order + more).clamp(0, 2) as usize]
             };
             most.position = most.position.max(log.position_noise.sd());
             most.of_position = most.of_position.max(after(log.position_noise, 1));
@@ -127,11 +126,31 @@ impl FilteredNoise {
 fn quantisation_floor(step: f64, spectra: &[&JointSpectra], pipeline: &Pipeline) -> [f64; 2] {
     let sd = step / 12.0_f64.sqrt();
     let mut floor = [0.0_f64; 2];
+    let mut gains = Gains::default();
     for log in spectra {
-        let kernels = MotionKernels::new(pipeline.motion_cutoff_hz, 1.0 / log.position_noise.rate);
-        for (floor, kernel) in floor.iter_mut().zip([&kernels.first, &kernels.second]) {
-            *floor = floor.max(sd * noise_gain(kernel));
+        let [_, first, second] = gains.of(log, pipeline);
+        for (floor, gain) in floor.iter_mut().zip([first, second]) {
+            *floor = floor.max(sd * gain);
         }
     }
     floor
+}
+
+/// What the motion filter and its two derivatives make of white noise, at the rate of the log before: logs of one robot mostly have one rate.
+#[derive(Default)]
+struct Gains {
+    known: Option<(f64, [f64; 3])>,
+}
+
+impl Gains {
+    fn of(&mut self, log: &JointSpectra, pipeline: &Pipeline) -> [f64; 3] {
+        let rate = log.position_noise.rate;
+        if let Some((_, gains)) = self.known.filter(|(known, _)| *known == rate) {
+            return gains;
+        }
+        let kernels = MotionKernels::new(pipeline.motion_cutoff_hz, 1.0 / rate);
+        let gains = [&kernels.smooth, &kernels.first, &kernels.second].map(|own| noise_gain(own));
+        self.known = Some((rate, gains));
+        gains
+    }
 }

@@ -7,6 +7,7 @@
 use super::fourier::Fourier;
 use crate::lanes::LANES;
 use pulp::{Arch, Simd, WithSimd};
+use std::sync::Arc;
 
 /// Neighbouring outputs that are summed side by side.
 const BLOCK: usize = 4 * LANES;
@@ -100,7 +101,7 @@ impl WithSimd for Every<'_> {
 
 /// One or two kernels, transformed: `k₁ + i k₂` over real samples gives both outputs at once, as real and imaginary part.
 struct Blocks {
-    fourier: Fourier,
+    fourier: Arc<Fourier>,
     size: usize,
     taps: usize,
     re: Vec<f64>,

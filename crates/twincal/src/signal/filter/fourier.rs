@@ -5,6 +5,10 @@
 
 use pulp::{Arch, Simd, WithSimd};
 use std::f64::consts::PI;
+use std::sync::{Arc, OnceLock};
+
+/// What every length up to 2¹⁶ needs, once it was asked for: logs of one robot ask for the same few.
+static KNOWN: [OnceLock<Arc<Fourier>>; 17] = [const { OnceLock::new() }; 17];
 
 /// What a length needs.
 #[derive(Debug)]
@@ -17,8 +21,16 @@ pub(crate) struct Fourier {
 
 impl Fourier {
     /// For a power of two, at least 4.
-    pub(crate) fn new(size: usize) -> Self {
+    pub(crate) fn new(size: usize) -> Arc<Self> {
         debug_assert!(size.is_power_of_two() && size >= 4, "length {size}");
+        let new = || Arc::new(Self::turns(size));
+        match KNOWN.get(size.trailing_zeros() as usize) {
+            Some(known) => known.get_or_init(new).clone(),
+            None => new(),
+        }
+    }
+
+    fn turns(size: usize) -> Self {
         let halves = std::iter::successors(Some(2), |half| Some(2 * half));
         let (cos, sin) = halves
             .take_while(|half| *half < size)

@@ -2,6 +2,7 @@
 
 use super::fourier::Fourier;
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 /// Pieces that a spectrum is averaged over at most, evenly spread: its relative sd is 18 % per bin, 1 % in a floor's median.
 const MOST_PIECES: usize = 32;
@@ -54,12 +55,11 @@ impl Spectrum {
         let size = 2.0 * self.density.len() as f64;
         let rate = self.width * size;
         let gain = |i: usize| (2.0 * rate * (PI * (i + 1) as f64 / size).sin()).powi(2 * order);
-        let undone: Vec<f64> = self
-            .density
-            .iter()
-            .enumerate()
-            .map(|(i, d)| d / gain(i))
-            .collect();
+        let density = self.density.iter().enumerate();
+        let undone: Vec<f64> = match order {
+            0 => self.density.clone(),
+            _ => density.map(|(i, d)| d / gain(i)).collect(),
+        };
         let floor = median(&undone, 0.25, 0.42) * self.floor
             / self.median(0.25, 0.42).max(f64::MIN_POSITIVE);
         Noise {
@@ -73,31 +73,52 @@ impl Spectrum {
     fn median(&self, from: f64, to: f64) -> f64 {
         median(&self.density, from, to)
     }
+}
 
-    /// Welch's average over 20 s pieces (or the whole run) of all `runs` that have at least 32 samples, Hann window, half
-    /// overlap, at most 32 of them. The first difference is transformed, its gain `2 sin(π f dt)` divided out. The floor is the median over
-    /// a quarter to 0.42 of the rate. `None` if every run is too short.
-    pub(crate) fn welch<'a>(
-        runs: impl Iterator<Item = &'a [f64]> + Clone,
-        interval: f64,
-    ) -> Option<Self> {
-        let longest = runs.clone().map(<[f64]>::len).max()?;
+/// Welch's average for channels of one length and interval: Hann window, half overlap.
+pub(crate) struct Welch {
+    piece: usize,
+    interval: f64,
+    window: Vec<f64>,
+    /// Gain of the first difference, bin by bin.
+    gains: Vec<f64>,
+    fourier: Arc<Fourier>,
+}
+
+impl Welch {
+    /// Pieces of 20 s, or of the whole of the `longest` run; `None` if it has fewer than 32 samples.
+    pub(crate) fn new(longest: usize, interval: f64) -> Option<Self> {
         let piece = (20.0 / interval).min(65_536.0) as usize;
         let piece = piece.min(longest.checked_sub(1)?);
         if piece < 31 {
             return None;
         }
         let size = piece.next_power_of_two();
-        let window: Vec<f64> = (0..piece)
-            .map(|i| (PI * (i as f64 + 0.5) / piece as f64).sin().powi(2))
-            .collect();
-        let energy: f64 = window.iter().map(|w| w * w).sum();
+        let gain = |i: usize| 2.0 * (PI * (i + 1) as f64 / size as f64).sin();
+        Some(Self {
+            piece,
+            interval,
+            window: (0..piece)
+                .map(|i| (PI * (i as f64 + 0.5) / piece as f64).sin().powi(2))
+                .collect(),
+            gains: (0..size / 2).map(gain).collect(),
+            fourier: Fourier::new(size),
+        })
+    }
+
+    /// Of all `runs` that are as long, at most 32 pieces. The first difference is transformed, its gain `2 sin(π f dt)` divided out. The floor is the
+    /// median over a quarter to 0.42 of the rate. `None` if every run is too short.
+    pub(crate) fn of<'a>(&self, runs: impl Iterator<Item = &'a [f64]> + Clone) -> Option<Spectrum> {
+        let starts = pieces(runs, self.piece);
+        if starts.is_empty() {
+            return None;
+        }
+        let size = 2 * self.gains.len();
+        let energy: f64 = self.window.iter().map(|w| w * w).sum();
         let mut density = vec![0.0; size / 2];
-        // Two pieces at a time, one as real and one as imaginary part.
-        let starts = pieces(runs, piece);
         let pieces = starts.len() as f64;
-        let fourier = Fourier::new(size);
         let (mut re, mut im) = (vec![0.0; size], vec![0.0; size]);
+        // Two pieces at a time, one as real and one as imaginary part.
         for pair in starts.chunks(2) {
             for (part, values) in [&mut re, &mut im]
                 .into_iter()
@@ -105,11 +126,11 @@ impl Spectrum {
             {
                 part.fill(0.0);
                 let steps = values.into_iter().flat_map(|values| values.windows(2));
-                for ((cell, step), window) in part.iter_mut().zip(steps).zip(&window) {
+                for ((cell, step), window) in part.iter_mut().zip(steps).zip(&self.window) {
                     *cell = (step[1] - step[0]) * window;
                 }
             }
-            fourier.forward(&mut re, &mut im);
+            self.fourier.forward(&mut re, &mut im);
             // |A|² + |B|² of Z = A + iB is (|Z_k|² + |Z_−k|²)/2
             for (i, sum) in density.iter_mut().enumerate() {
                 let (k, mirror) = (i + 1, size - i - 1);
@@ -117,16 +138,14 @@ impl Spectrum {
                 *sum += 0.5 * (square(k) + square(mirror));
             }
         }
-        let width = 1.0 / (size as f64 * interval);
-        for (i, value) in density.iter_mut().enumerate() {
-            let gain = 2.0 * (PI * (i + 1) as f64 / size as f64).sin();
-            *value *= 2.0 * interval / (energy * pieces * gain * gain);
+        for (value, gain) in density.iter_mut().zip(&self.gains) {
+            *value *= 2.0 * self.interval / (energy * pieces * gain * gain);
         }
         let median = median(&density, 0.25, 0.42);
         // A bin is an average of `pieces` exponentials: median/mean goes from ln 2 to 1 (Wilson–Hilferty).
         let floor = median / (1.0 - 1.0 / (9.0 * pieces)).powi(3);
-        Some(Self {
-            width,
+        Some(Spectrum {
+            width: 1.0 / (size as f64 * self.interval),
             density,
             floor,
         })
@@ -170,6 +189,11 @@ mod tests {
     use super::*;
     use rand::{RngExt, SeedableRng};
 
+    fn spectrum_of(run: &[f64], interval: f64) -> Spectrum {
+        let welch = Welch::new(run.len(), interval).unwrap();
+        welch.of(std::iter::once(run)).unwrap()
+    }
+
     #[test]
     fn white_noise_is_measured_under_slow_motion() {
         // 20 000 samples: the median over 3400 bins has a relative sd below 3 %; ±15 % is five of them (1e-6).
@@ -181,15 +205,13 @@ mod tests {
                     (2.0 * PI * 0.3 * f64::from(i) * 1e-3).sin() + sd * noise
                 })
                 .collect();
-            let spectrum = Spectrum::welch(std::iter::once(q.as_slice()), 1e-3).unwrap();
+            let spectrum = spectrum_of(&q, 1e-3);
             let noise = spectrum.noise(1);
             assert_eq!(noise.order, 0);
             assert!((noise.sd() / sd - 1.0).abs() < 0.15, "{noise:?} for {sd}");
             // The same noise in a velocity that is a difference of positions is found as what it is.
             let qd: Vec<f64> = q.windows(2).map(|w| (w[1] - w[0]) * 1e3).collect();
-            let noise = Spectrum::welch(std::iter::once(qd.as_slice()), 1e-3)
-                .unwrap()
-                .noise(1);
+            let noise = spectrum_of(&qd, 1e-3).noise(1);
             assert_eq!(noise.order, 1);
             assert!((noise.sd() / sd - 1.0).abs() < 0.15, "{noise:?} for {sd}");
         }
@@ -200,7 +222,7 @@ mod tests {
         let q: Vec<f64> = (0..8000)
             .map(|i| 3.0 * (2.0 * PI * 1.7 * f64::from(i) * 2e-3).cos())
             .collect();
-        let spectrum = Spectrum::welch(std::iter::once(q.as_slice()), 2e-3).unwrap();
+        let spectrum = spectrum_of(&q, 2e-3);
         let power: f64 = spectrum.density.iter().sum::<f64>() * spectrum.width;
         assert!((power - 4.5).abs() < 0.05, "{power}");
     }
