@@ -1,11 +1,12 @@
 //! `twin.json`: everything that `check`, `predict` and `report` need of a calibration.
 
-use crate::artifact::{Artifact, Claim, Maker, REPORT, RESULT, RUN_LOG, TWIN};
+use crate::artifact::{Artifact, Claim, Maker, Pieces, REPORT, RESULT, RUN_LOG, TWIN};
 use crate::config::{Gates, ReadAs};
 use crate::context::ReportContext;
 use crate::error::{Error, Place, Result};
 use crate::result_json::result_json;
 use serde::{Deserialize, Serialize};
+use std::io::{BufReader, Read};
 use twincal::calibrate::Calibration;
 
 /// A calibration as it lies in an artefact.
@@ -34,7 +35,7 @@ impl StoredTwin {
             &[TWIN]
         })?;
         let bytes = artifact.read(TWIN)?;
-        serde_json::from_slice(&bytes).map_err(|e| {
+        Self::parse(&mut bytes.as_slice()).map_err(|e| {
             let problem = format!("does not hold a twin of this version: {e}");
             Error::content(
                 Place::file(TWIN),
@@ -42,6 +43,11 @@ impl StoredTwin {
                 "fit again with this version of twincal",
             )
         })
+    }
+
+    /// The one reader of a twin: each kind of source of its text would be half a megabyte of the program.
+    fn parse(text: &mut dyn Read) -> serde_json::Result<Self> {
+        serde_json::from_reader(BufReader::new(text))
     }
 
     /// The text of `result.json`.
@@ -67,19 +73,28 @@ impl StoredTwin {
             what: TWIN.into(),
             problem,
         };
-        let twin = || -> Result<Vec<u8>> {
-            let twin = serde_json::to_vec(self).map_err(|e| internal(e.to_string()))?;
+        let twin = || -> Result<Pieces> {
+            let mut twin = Pieces::default();
+            serde_json::to_writer(&mut twin, self).map_err(|e| internal(e.to_string()))?;
             // What cannot be read back must not be written.
-            serde_json::from_slice::<Self>(&twin)
-                .map_err(|e| internal(format!("{e}, after `{}`", before(&twin, e.column()))))?;
+            Self::parse(&mut twin.reader()).map_err(|e| {
+                internal(format!(
+                    "{e}, after `{}`",
+                    before(&twin.to_vec(), e.column())
+                ))
+            })?;
             Ok(twin)
         };
         let shown = || (self.result_json(), self.report());
         let (twin, (result, report)) = rayon::join(twin, shown);
-        let mut files = vec![(RESULT, result?.into_bytes()), (TWIN, twin?)];
-        files.extend(report?.map(|report| (REPORT, report.into_bytes())));
-        files.push((RUN_LOG, run_log.into_bytes()));
-        files.extend(more);
+        let mut texts = vec![(RESULT, result?.into_bytes())];
+        texts.extend(report?.map(|report| (REPORT, report.into_bytes())));
+        texts.push((RUN_LOG, run_log.into_bytes()));
+        texts.extend(more);
+        let texts = texts.into_iter();
+        let mut files: Vec<(&str, Pieces)> =
+            texts.map(|(name, text)| (name, text.into())).collect();
+        files.push((TWIN, twin?));
         claim.commit(made_by, files)
     }
 

@@ -1,5 +1,6 @@
 //! `manifest.json`: format version, who wrote the artefact, and the checksum of every file.
 
+use super::pieces::Pieces;
 use crate::error::{Error, Place, Result};
 use crate::open::open_log_file;
 use rayon::prelude::*;
@@ -66,10 +67,10 @@ struct Version {
 
 impl Manifest {
     /// The manifest of these files.
-    pub(super) fn of(made_by: Maker, files: &[(&str, Vec<u8>)]) -> Self {
-        let entry = |bytes: &[u8]| FileEntry {
-            bytes: bytes.len() as u64,
-            sha256: sha256(bytes),
+    pub(super) fn of(made_by: Maker, files: &[(&str, Pieces)]) -> Self {
+        let entry = |text: &Pieces| FileEntry {
+            bytes: text.len() as u64,
+            sha256: sha256_of(text.iter()),
         };
         Self {
             format: FORMAT,
@@ -78,7 +79,7 @@ impl Manifest {
             made_by,
             files: files
                 .par_iter()
-                .map(|(name, bytes)| ((*name).to_owned(), entry(bytes)))
+                .map(|(name, text)| ((*name).to_owned(), entry(text)))
                 .collect(),
         }
     }
@@ -123,7 +124,13 @@ fn numbers(version: &str) -> Vec<u64> {
 
 /// SHA-256 in lower-case hexadecimal.
 pub fn sha256(bytes: &[u8]) -> String {
-    hexadecimal(&Sha256::digest(bytes))
+    sha256_of(std::iter::once(bytes))
+}
+
+fn sha256_of<'a>(pieces: impl Iterator<Item = &'a [u8]>) -> String {
+    let mut digest = Sha256::new();
+    pieces.for_each(|piece| digest.update(piece));
+    hexadecimal(&digest.finalize())
 }
 
 /// SHA-256 of a file.

@@ -17,12 +17,14 @@ mod beside;
 mod inputs;
 mod manifest;
 mod output_file;
+mod pieces;
 mod read;
 mod write;
 
 pub use inputs::Inputs;
 pub use manifest::{FORMAT, FileEntry, Maker, Manifest, sha256, sha256_of_file, sha256_unless};
 pub use output_file::OutputFile;
+pub use pieces::Pieces;
 pub use read::Artifact;
 pub use write::{Claim, Replace};
 

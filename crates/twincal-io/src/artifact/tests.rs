@@ -7,10 +7,10 @@ use std::fs;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-fn files(word: &str) -> Vec<(&'static str, Vec<u8>)> {
+fn files(word: &str) -> Vec<(&'static str, Pieces)> {
     vec![
-        (RESULT, format!("{{\"is\":\"{word}\"}}").into_bytes()),
-        (REPORT, vec![b'x'; 100_000]),
+        (RESULT, format!("{{\"is\":\"{word}\"}}").into_bytes().into()),
+        (REPORT, vec![b'x'; 100_000].into()),
     ]
 }
 

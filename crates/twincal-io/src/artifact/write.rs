@@ -3,6 +3,7 @@
 use super::beside::{Beside, Lock};
 use super::inputs::Inputs;
 use super::manifest::{Maker, Manifest};
+use super::pieces::Pieces;
 use super::read::MAX_MANIFEST;
 use super::{MANIFEST, NAMES, OTHER_OUTPUT};
 use crate::error::{Error, Place, Result};
@@ -78,11 +79,14 @@ impl Claim {
     ///
     /// # Errors
     /// The system's refusal (disk full, …); then nothing has changed and nothing is left behind.
-    pub fn commit(self, made_by: Maker, mut files: Vec<(&str, Vec<u8>)>) -> Result<()> {
+    pub fn commit(self, made_by: Maker, files: Vec<(&str, impl Into<Pieces>)>) -> Result<()> {
+        let files = files.into_iter();
+        let mut files: Vec<(&str, Pieces)> =
+            files.map(|(name, text)| (name, text.into())).collect();
         let manifest = serde_json::to_vec_pretty(&Manifest::of(made_by, &files)).map_err(|e| {
             Error::content(Place::file(MANIFEST), e.to_string(), "report this as a bug")
         })?;
-        files.push((MANIFEST, manifest));
+        files.push((MANIFEST, manifest.into()));
         let done = stage(&self.beside, &files).and_then(|()| {
             if self.exists {
                 exchange(&self.beside)
@@ -173,11 +177,11 @@ fn recover(beside: &Beside) -> io::Result<()> {
 }
 
 /// Writes and syncs every file in the staging folder.
-pub(super) fn stage(beside: &Beside, files: &[(&str, Vec<u8>)]) -> io::Result<()> {
+pub(super) fn stage(beside: &Beside, files: &[(&str, Pieces)]) -> io::Result<()> {
     fs::create_dir(&beside.staging)?;
-    for (name, bytes) in files {
+    for (name, text) in files {
         let mut file = File::create_new(beside.staging.join(name))?;
-        file.write_all(bytes)?;
+        text.iter().try_for_each(|piece| file.write_all(piece))?;
         file.sync_all()?;
     }
     sync_folder(&beside.staging)
