@@ -388,7 +388,7 @@ FAULTS = {
     "pushed_by_hand": Fault("3 s, 6 N·m, every log", pushed_by_hand, CONTACT, "log"),
 }
 # Mistakes that are repaired and said: the answer may be "Yes" beside their finding.
-REPAIRED = ("polled", "repeated_q", "repeated_all", "contact", "pushed_by_hand", "late_all")
+REPAIRED = ("polled", "repeated_q", "repeated_all", "contact", "pushed_by_hand", "late_all", "late_one_joint")
 GOOD = ("none", "same_programme")
 
 

@@ -275,8 +275,10 @@ impl CommonFit {
         let range = self.rows_of(log);
         let (columns, mut solution) = self.column(range.clone(), column);
         self.matrix.solve(&mut solution);
-        // r = R c̃, the residual without it, and their products by log and second.
-        let (mut square, mut sums) = (0.0, BTreeMap::<(usize, i64), f64>::new());
+        // r = R c̃, the residual without it, and their products: by log and second, and by second since the log began, as logs of one
+        // programme have one error.
+        let mut square = 0.0;
+        let mut sums = [(); 2].map(|()| BTreeMap::<(usize, i64), f64>::new());
         let mut says = BTreeSet::new();
         for (number, own) in self.rows.iter().enumerate() {
             let column = number.checked_sub(range.start);
@@ -289,18 +291,23 @@ impl CommonFit {
             if let Some(column) = column {
                 square += dot(&r, column);
             }
+            let began = own.block.time.first().copied().unwrap_or_default();
             for (i, r) in r.iter().enumerate() {
-                let second = (own.block.time[i] / CLUSTER).floor() as i64;
+                let second = |time: f64| (time / CLUSTER).floor() as i64;
+                let [at, since] = [0.0, began].map(|from| second(own.block.time[i] - from));
                 let product = r * (own.residual[i] - effect.size * r);
                 if column.is_some() {
-                    says.insert((own.block.log, second));
+                    says.insert((own.block.log, at));
                 }
-                *sums.entry((own.block.log, second)).or_default() += product;
+                let places = [(own.block.log, at), (0, since)];
+                for (sums, place) in sums.iter_mut().zip(places) {
+                    *sums.entry(place).or_default() += product;
+                }
             }
         }
-        let squares: f64 = sums.values().map(|sum| sum * sum).sum();
+        let squares = sums.map(|sums| sums.values().map(|sum| sum * sum).sum::<f64>());
         Some(Effect {
-            sd: squares.sqrt() / square,
+            sd: squares[0].max(squares[1]).sqrt() / square,
             clusters: says.len(),
             ..effect
         })

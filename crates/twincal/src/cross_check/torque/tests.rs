@@ -247,3 +247,27 @@ fn logs_with_different_payloads_are_not_compared() {
     logs[0].payload = crate::signal::Payload::Unknown;
     assert_eq!(said(&logs), []);
 }
+
+/// Logs of one programme have one error at one time: three of them say nothing that one does not, and the sd of their drift is that of one.
+#[test]
+fn logs_of_one_programme_count_as_one() {
+    let one = &logs(0, 1)[0];
+    let drift = |count: usize| {
+        let copies: Vec<Trajectory> = (0..count)
+            .map(|k| Trajectory {
+                name: format!("run{k}"),
+                ..one.clone()
+            })
+            .collect();
+        let fit = common_fit(&arm(1.0), &compared(&copies)).unwrap();
+        fit.judged(None, |own| Some(growing(own))).unwrap()
+    };
+    let [alone, copied] = [1, 3].map(drift);
+    assert!((copied.size / alone.size - 1.0).abs() < 1e-6);
+    assert!(
+        (copied.sd / alone.sd - 1.0).abs() < 1e-6,
+        "{} {}",
+        copied.sd,
+        alone.sd
+    );
+}
